@@ -1,0 +1,1 @@
+"""Observers that correct a black-box twin, and what tunes and scores them."""

@@ -1,0 +1,1 @@
+"""Drives: manoeuvres, real vehicles, the experiments of the papers, the command line."""
