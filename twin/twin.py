@@ -1,0 +1,256 @@
+"""The digital twin: a vehicle in MuJoCo behind the black-box boundary."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from twin import kernel
+from twin.car import DATA_VIEWS, MODEL_VIEWS, Car
+from twin.channels import INPUTS, OUTPUTS, STATES, TYRE_OUTPUTS, WHEELS
+from twin.contact import ROAD
+from twin.errors import TwinError
+from twin.load import PARAMETERS
+from twin.tyre import effective_radius
+from twin.vehicle import SENSORS, Vehicle
+
+Array = NDArray[np.float64]
+LARGEST_TORQUE = 1e5  # [N m], far beyond what a wheel ever sees
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+class Snapshot(NamedTuple):
+    """Everything that decides a twin's future."""
+
+    state: Array  # MuJoCo's integration state
+    tyre_state: Array  # (4, 3)
+    parameters: Array  # (10,)
+
+
+class Twin:
+    """A black-box simulator: step it, read its sensors, correct it, set its parameters.
+
+    Attributes:
+        vehicle: what it simulates; workers rebuild their own twin from it.
+        car: the same twin as compiled code sees it, valid as long as this object lives.
+        inputs, outputs, states, parameters: names, in the order of the arrays.
+        model, data: MuJoCo's, to look at and to draw; an observer has no business there.
+    """
+
+    inputs = INPUTS
+    outputs = OUTPUTS
+    states = STATES
+    parameters = PARAMETERS
+    tyre_outputs = TYRE_OUTPUTS
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self.model = vehicle.compile()
+        self.data = mujoco.MjData(self.model)
+        self.car = _bind(vehicle, self.model, self.data)
+        self.dt = self.car.dt
+        self.reset()
+
+    def __reduce__(self) -> str:
+        raise TwinError("a Twin owns memory of MuJoCo and cannot be pickled; send its Vehicle")
+
+    def reset(self, speed: float = 0.0, road: ArrayLike = (0.0, 0.0, 0.0, 0.0)) -> None:
+        """Puts the car on its wheels, settled while it rolls straight ahead, with its parameters.
+
+        Heave, pitch, roll and travels are those at which nothing accelerates but the car as a
+        whole, which coasts; wheels roll freely and the tyres are relaxed.
+
+        Args:
+            speed: [m/s], forwards.
+            road: (4,) height under each wheel [m].
+
+        Raises:
+            TwinError: the car has no such equilibrium, for example as it is too heavy.
+        """
+        from scipy.optimize import root
+
+        if not 0.0 <= speed <= 150.0:
+            raise TwinError(f"reset: speed is {speed} m/s; allowed: 0 to 150")
+        u = np.zeros(len(INPUTS))
+        u[9:] = road
+        mujoco.mj_resetData(self.model, self.data)
+        pose = np.zeros(7)
+        pose[0] = self.data.qpos[2] + np.mean(u[9:])
+        spin = np.zeros(4)
+        rest = [2, 3, 4, *self.car.travel_dof]
+
+        def accelerations(pose: Array) -> Array:
+            self._place(pose, speed, spin, u[9:])
+            kernel.step(self.car, u, np.empty(len(OUTPUTS)))
+            return self.data.qacc[rest]
+
+        for _ in range(3):  # the rolling radius hangs on the load, if weakly
+            found = root(accelerations, pose, tol=1e-13)
+            pose = found.x
+            loads = self.car.tyre_output[:, 2]
+            spin[:] = [
+                speed / effective_radius(t, z) for t, z in zip(self.car.tyres, loads, strict=True)
+            ]
+        residual = np.abs(accelerations(pose)).max()
+        if not residual < 1e-3:
+            raise TwinError(
+                f"{self.vehicle.source}: the car does not settle on its wheels at {speed} m/s; "
+                f"accelerations of {residual:.3g} m/s2 remain"
+            )
+        self._place(pose, speed, spin, u[9:])
+        self.data.time = 0.0
+
+    def _place(self, pose: Array, speed: float, spin: Array, road: Array) -> None:
+        """Puts height, roll, pitch and four travels, rolling straight ahead on relaxed tyres."""
+        data, car = self.data, self.car
+        data.qpos[:] = 0.0
+        data.qpos[2] = pose[0]
+        mujoco.mju_euler2Quat(data.qpos[3:7], np.array([pose[2], pose[1], 0.0]), "YXZ")
+        data.qpos[car.travel_qpos] = pose[3:]
+        data.qvel[:] = 0.0
+        data.qvel[0] = speed
+        data.qvel[car.spin_dof] = spin
+        car.tyre_state[:, :ROAD] = 0.0
+        car.tyre_state[:, ROAD] = road
+
+    def step(self, u: ArrayLike) -> Array:
+        """Advances by one step: TiL Eq. (1).
+
+        Args:
+            u: (13,) inputs, see `inputs`.
+
+        Returns:
+            (10,) measurements before the step, see `outputs`.
+
+        Raises:
+            TwinError: an input is not finite or out of range, or the car has blown up.
+        """
+        u = np.ascontiguousarray(u, dtype=np.float64)
+        check_inputs(u[None], "step")
+        y = np.empty(len(OUTPUTS))
+        kernel.step(self.car, u, y)
+        self.check()
+        return y
+
+    def correct(self, dx: ArrayLike) -> None:
+        """Adds (28,) to the states, see `states`: TiL Eq. (4)."""
+        kernel.correct(self.car, _vector(dx, len(STATES), "correct"))
+
+    def set_parameters(self, p: ArrayLike) -> Array:
+        """Sets the (10,) load parameters, see `parameters`, and returns what is physically valid."""
+        p = _vector(p, len(PARAMETERS), "set_parameters").copy()
+        kernel.set_parameters(self.car, p)
+        return p
+
+    def read_states(self) -> Array:
+        """The (28,) states now, see `states`."""
+        x = np.empty(len(STATES))
+        kernel.read_states(self.car, x)
+        return x
+
+    def tyre_forces(self) -> Array:
+        """(4, 9) forces, moments and slips of the last step, see `tyre_outputs`."""
+        return self.car.tyre_output.copy()
+
+    def snapshot(self) -> Snapshot:
+        """Everything that decides the future; a replay from it is bit-exact."""
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        return Snapshot(state, self.car.tyre_state.copy(), self.car.parameters.copy())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Goes back to a snapshot of a twin of the same vehicle."""
+        mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
+        self.car.tyre_state[:] = snapshot.tyre_state
+        kernel.set_parameters(self.car, snapshot.parameters.copy())
+
+    def check(self) -> None:
+        """Raises TwinError once the simulation has blown up."""
+        if not kernel.is_sound(self.car):
+            raise TwinError(
+                f"{self.vehicle.source}: the simulation blew up at t = {self.data.time:.3f} s; "
+                "look for inputs or corrections that no car can follow"
+            )
+
+
+def check_inputs(inputs: Array, what: str) -> None:
+    """Refuses inputs that compiled code must not meet.
+
+    Args:
+        inputs: (n, 13).
+        what: what they belong to, for the message.
+
+    Raises:
+        TwinError: not finite, a torque beyond any car's, or a negative brake torque.
+    """
+    if inputs.ndim != 2 or inputs.shape[1] != len(INPUTS):
+        raise TwinError(f"{what}: inputs have shape {inputs.shape}; allowed: (n, {len(INPUTS)})")
+    low = np.array([-50.0] + [-LARGEST_TORQUE] * 4 + [0.0] * 4 + [-1e4] * 4)
+    high = np.array([50.0] + [LARGEST_TORQUE] * 8 + [1e4] * 4)
+    good = (inputs >= low) & (inputs <= high)
+    if not good.all():
+        row, column = np.argwhere(~good)[0]
+        raise TwinError(
+            f"{what}: {INPUTS[column]} is {inputs[row, column]} in sample {row}; "
+            f"allowed: {low[column]:g} to {high[column]:g}"
+        )
+
+
+def _vector(values: ArrayLike, size: int, what: str) -> Array:
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.shape != (size,) or not np.isfinite(array).all():
+        raise TwinError(f"{what}: needs {size} finite numbers, got {array.shape}: {array}")
+    return array
+
+
+def _bind(vehicle: Vehicle, model: mujoco.MjModel, data: mujoco.MjData) -> Car:
+    chassis = model.body("chassis").id
+    wheels = [model.body(f"wheel_{w}").id for w in WHEELS]
+    travels = [model.joint(f"travel_{w}").id for w in WHEELS]
+    spins = [model.joint(f"spin_{w}").id for w in WHEELS]
+    addresses = [model.sensor_adr[model.sensor(name).id] for name in SENSORS]
+    ax, roll_rate, *wheel_speeds = addresses
+    hubs = np.array([model.body_pos[model.body_parentid[wheel]] for wheel in wheels])
+    # MuJoCo takes the inertial frame for the body frame where the file has them equal.
+    model.body_sameframe[chassis] = 0
+    axes = np.empty(9)
+    mujoco.mju_quat2Mat(axes, model.body_iquat[chassis])
+    turn = axes.reshape(3, 3)
+    inertia = turn @ np.diag(model.body_inertia[chassis]) @ turn.T
+    tyres = vehicle.tyres()
+    return Car(
+        model=model._address,
+        data=data._address,
+        **{name: getattr(data, name) for name in DATA_VIEWS},
+        **{name: getattr(model, name) for name in MODEL_VIEWS},
+        chassis=chassis,
+        wheel_body=np.array(wheels),
+        travel_joint=np.array(travels),
+        travel_qpos=model.jnt_qposadr[travels].astype(np.int64),
+        travel_dof=model.jnt_dofadr[travels].astype(np.int64),
+        spin_qpos=model.jnt_qposadr[spins].astype(np.int64),
+        spin_dof=model.jnt_dofadr[spins].astype(np.int64),
+        sensor=np.array([*range(ax, ax + 3), *range(roll_rate, roll_rate + 3), *wheel_speeds]),
+        dt=float(model.opt.timestep),
+        wheelbase=float(hubs[:2, 0].mean() - hubs[2:, 0].mean()),
+        track=float(hubs[0, 1] - hubs[1, 1]),
+        steering_ratio=float(model.numeric("steering_ratio").data[0]),
+        ackermann=float(model.numeric("ackermann").data[0]),
+        drag_area=float(model.numeric("drag_area").data[0]),
+        spin_inertia=model.body_inertia[wheels, 1].copy(),
+        nominal=np.array(
+            [
+                model.body_mass[chassis],
+                *model.body_ipos[chassis],
+                *np.diag(inertia),
+                *(inertia[0, 1], inertia[0, 2], inertia[1, 2]),
+            ]
+        ),
+        side=np.array([1.0, -1.0, 1.0, -1.0]) * tyres["side"],
+        tyres=tyres,
+        tyre_state=np.zeros((4, 3)),
+        tyre_output=np.zeros((4, len(TYRE_OUTPUTS))),
+        parameters=np.zeros(len(PARAMETERS)),
+        scratch=np.empty(32),
+    )

@@ -1,0 +1,152 @@
+"""A vehicle: an MJCF file with its steering, aerodynamics, tyres and loads, checked at the door."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import models
+from twin.channels import WHEELS
+from twin.errors import TwinError
+from twin.load import PointMass, RigidBody
+from twin.tir import read_tyre
+
+# Numbers of <custom> that every car needs, with the least that is allowed
+NUMBERS = {"steering_ratio": 1e-3, "ackermann": 0.0, "drag_area": 0.0}
+SENSORS = ("acceleration", "rates", *(f"wheel_speed_{w}" for w in WHEELS))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """A car by its files, and what it carries. It can be pickled; a `Twin` of it cannot.
+
+    Attributes:
+        source: the MJCF file.
+        loads: point masses fixed to the chassis as bodies of their own.
+    """
+
+    source: Path
+    loads: tuple[PointMass, ...] = ()
+
+    @classmethod
+    def load(cls, name: str | Path) -> "Vehicle":
+        """A car of the project by its name ("suv"), or of any MJCF file by its path.
+
+        Raises:
+            TwinError: no such file, or one that does not describe a car; the message says why.
+        """
+        vehicle = cls(source=models.path(str(name)))
+        vehicle.compile()
+        return vehicle
+
+    def with_loads(self, loads: Iterable[PointMass]) -> "Vehicle":
+        """The same car with more point masses on board, positions in the chassis frame."""
+        return replace(self, loads=(*self.loads, *loads))
+
+    def spec(self) -> mujoco.MjSpec:
+        """The car as an editable MJCF, loads attached.
+
+        Raises:
+            TwinError: the file is missing or broken.
+        """
+        if not self.source.is_file():
+            raise TwinError(f"{self.source}: no such vehicle file; give an MJCF file or a car's name")
+        try:
+            spec = mujoco.MjSpec.from_file(str(self.source))
+        except (ValueError, mujoco.FatalError) as error:
+            raise TwinError(f"{self.source}: {' '.join(str(error).split())}") from None
+        for load in self.loads:
+            body = spec.body("chassis").add_body(name=load.name, pos=load.position)
+            body.ipos = np.zeros(3)
+            body.mass = load.mass
+            body.inertia = np.full(3, 1e-9)
+            body.explicitinertial = True
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                size=[0.5 * (3.0 * load.mass / (4.0 * np.pi * 1000.0)) ** (1 / 3), 0, 0],
+                rgba=[0.85, 0.45, 0.1, 1.0],
+                mass=0.0,
+                contype=0,
+                conaffinity=0,
+            )
+        return spec
+
+    def compile(self) -> mujoco.MjModel:
+        """The model, checked so that nothing in compiled code can meet a missing part.
+
+        Raises:
+            TwinError: something a car needs is missing or out of range.
+        """
+        try:
+            model = self.spec().compile()
+        except (ValueError, mujoco.FatalError) as error:
+            raise TwinError(f"{self.source}: {' '.join(str(error).split())}") from None
+        self._check(model)
+        return model
+
+    def _check(self, model: mujoco.MjModel) -> None:
+        kinds = {
+            "body": (mujoco.mjtObj.mjOBJ_BODY, ("chassis", *(f"wheel_{w}" for w in WHEELS))),
+            "joint": (
+                mujoco.mjtObj.mjOBJ_JOINT,
+                ("chassis", *(f"{j}_{w}" for w in WHEELS for j in ("travel", "spin"))),
+            ),
+            "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, SENSORS),
+            "numeric": (mujoco.mjtObj.mjOBJ_NUMERIC, tuple(NUMBERS)),
+            "text": (mujoco.mjtObj.mjOBJ_TEXT, ("tyre_front", "tyre_rear")),
+        }
+        for kind, (code, names) in kinds.items():
+            for name in names:
+                if mujoco.mj_name2id(model, code, name) < 0:
+                    raise TwinError(f"{self.source}: has no {kind} named {name!r}; a car needs one")
+        if (model.nq, model.nv) != (15, 14) or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
+            raise TwinError(
+                f"{self.source}: has {model.nv} degrees of freedom; a car has 14: chassis on a free "
+                "joint that comes first, four travels, four spins"
+            )
+        if model.opt.integrator not in (
+            mujoco.mjtIntegrator.mjINT_EULER,
+            mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+        ):
+            raise TwinError(f"{self.source}: option integrator must be Euler or implicitfast")
+        for name, least in NUMBERS.items():
+            value = model.numeric(name).data[0]
+            if not least <= value < np.inf:
+                raise TwinError(f"{self.source}: numeric {name} is {value}; allowed: at least {least}")
+
+    def tyres(self) -> np.ndarray:
+        """Coefficients of the four tyres, (4,) records; .tir files beside the MJCF come first.
+
+        Raises:
+            TwinError: a .tir file is missing or broken.
+        """
+        model = self.compile()
+        read = []
+        for axle in ("tyre_front", "tyre_rear"):
+            text = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, axle)
+            start = model.text_adr[text]
+            name = model.text_data[start : start + model.text_size[text] - 1].decode()
+            beside = self.source.parent / name
+            read.append(read_tyre(beside if beside.is_file() else models.path(name)))
+        return np.array([read[0], read[0], read[1], read[1]], dtype=read[0].dtype)
+
+    def chassis(self) -> RigidBody:
+        """Mass, CM and inertia of the chassis and all that is fixed to it, in the chassis frame."""
+        model = self.compile()
+        chassis = model.body("chassis").id
+        welded = np.flatnonzero(model.body_weldid == chassis)
+        data = mujoco.MjData(model)
+        data.qpos[3:7] = 1.0, 0.0, 0.0, 0.0
+        mujoco.mj_kinematics(model, data)
+        origin = data.xpos[chassis]
+        masses = model.body_mass[welded]
+        places = data.xipos[welded] - origin
+        cm = masses @ places / masses.sum()
+        inertia = np.zeros((3, 3))
+        for body, mass, place in zip(welded, masses, places - cm, strict=True):
+            axes = data.ximat[body].reshape(3, 3)
+            inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
+            inertia += mass * (place @ place * np.eye(3) - np.outer(place, place))
+        return RigidBody(mass=float(masses.sum()), cm=cm, inertia=inertia)
