@@ -1,0 +1,178 @@
+"""The one shape of every result: rows of medians over seeds, as JSON or as a table."""
+
+import json
+import math
+import platform
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Self
+
+PACKAGES = ("mujoco", "numpy", "numba", "twin-in-the-loop")
+OPTIONAL_COLUMNS = ("paper", "limit")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One figure of a result.
+
+    Attributes:
+        case: the experiment, in the words of the paper's row, or the real vehicle's name.
+        quantity: what is estimated.
+        metric: how it is scored.
+        unit: of median, p90, paper and limit.
+        estimator: which observer.
+        seeds: how many.
+        median: over the seeds.
+        p90: 90th percentile over the seeds.
+        paper: the paper's figure.
+        limit: the Cramer-Rao bound.
+    """
+
+    case: str
+    quantity: str
+    metric: str
+    unit: str
+    estimator: str
+    seeds: int
+    median: float
+    p90: float
+    paper: float | None = None
+    limit: float | None = None
+
+    @classmethod
+    def over_seeds(
+        cls,
+        values: Sequence[float],
+        *,
+        case: str,
+        quantity: str,
+        metric: str,
+        unit: str,
+        estimator: str,
+        paper: float | None = None,
+        limit: float | None = None,
+    ) -> Self:
+        """The row of values, shape (seeds,) [unit]; a NaN among them makes the figures NaN."""
+        import numpy as np  # not at the top: `til list` is quicker without
+
+        if np.ndim(values) != 1 or np.size(values) == 0:
+            raise ValueError(f"values must have shape (seeds,), not {np.shape(values)}")
+        with np.errstate(invalid="ignore"):  # between two infinities
+            p90 = float(np.quantile(values, 0.9))
+        return cls(
+            case=case,
+            quantity=quantity,
+            metric=metric,
+            unit=unit,
+            estimator=estimator,
+            seeds=len(values),
+            median=float(np.median(values)),
+            p90=p90,
+            paper=paper,
+            limit=limit,
+        )
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of what decides the figures."""
+    return {"python": platform.python_version()} | {p: metadata.version(p) for p in PACKAGES}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What a scenario, a reproduction or the benchmark gives.
+
+    Attributes:
+        name: of the command's subject.
+        settings: what it was run with.
+        versions: of the software.
+        seconds: it took [s].
+        rows: the figures.
+    """
+
+    name: str
+    settings: dict[str, Any]
+    versions: dict[str, str] = field(default_factory=versions)
+    seconds: float
+    rows: Sequence[Row]
+
+    def to_json(self) -> dict[str, Any]:
+        """The result in types that JSON has; NaN and infinity become None."""
+        return _plain({f.name: getattr(self, f.name) for f in fields(self)})
+
+    def table(self) -> str:
+        """The rows as aligned text, 3 significant digits; paper and limit only if a row has one."""
+        names = [f.name for f in fields(Row)]
+        empty = {n for n in OPTIONAL_COLUMNS if all(getattr(r, n) is None for r in self.rows)}
+        return _aligned({n: [getattr(r, n) for r in self.rows] for n in names if n not in empty})
+
+
+def write_json(data: dict[str, Any], path: Path) -> None:
+    """Writes one JSON object, whole or not at all."""
+    with replacing(path) as partial:
+        partial.write_text(json_text(data) + "\n", encoding="utf-8")
+
+
+def json_text(data: dict[str, Any]) -> str:
+    """One JSON object as text that every JSON reader takes: no NaN, no infinity."""
+    return json.dumps(data, indent=2, allow_nan=False)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Lends a path beside the given one; what is written there takes its place at the end.
+
+    After an error nothing is left and an older file stays. A device or pipe is lent itself.
+    """
+    if path.exists() and not path.is_file():
+        yield path
+        return
+    target = path.resolve()  # a symbolic link stays one
+    partial = target.with_name(f".{uuid.uuid4().hex}.{target.name}")
+    try:
+        yield partial
+        partial.replace(target)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Row):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):  # NumPy's scalars and arrays
+        return _plain(value.tolist())
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _aligned(columns: dict[str, list[Any]]) -> str:
+    """Text to the left, numbers to the right, headings and values in columns."""
+    shown = []
+    for name, values in columns.items():
+        cells = [name, *map(_cell, values)]
+        width = max(map(len, cells))
+        is_text = any(isinstance(value, str) for value in values)
+        shown.append([cell.ljust(width) if is_text else cell.rjust(width) for cell in cells])
+    lines = ["  ".join(line).rstrip() for line in zip(*shown, strict=True)]
+    rule = "  ".join("-" * len(column[0]) for column in shown)
+    return "\n".join([lines[0], rule, *lines[1:]])
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, str | int):
+        return str(value)
+    text = f"{value:#.3g}".rstrip(".")
+    return f"{float(text):.0f}" if 1e3 <= abs(float(text)) < 1e6 else text

@@ -1,0 +1,242 @@
+"""The car of a timeline in 3D: its shapes, poses, tyre forces and path, logged to Rerun."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+import twin
+from estimators.estimate import Estimate
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+Array = NDArray[np.float64]
+
+WORLD = "world"
+NEWTONS_PER_METRE = 5000.0  # scale of the force arrows
+_CHASSIS_OPACITY = 0.45  # shows loads and forces inside
+_FORCE_COLOUR = (240, 190, 40)
+_PATH_COLOUR = (130, 150, 170)
+_SHAPES = {
+    "boxes": (mujoco.mjtGeom.mjGEOM_BOX,),
+    "cylinders": (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE),
+    "ellipsoids": (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_ELLIPSOID),
+}
+
+
+class Motion(NamedTuple):
+    """How a car moves over n frames.
+
+    Attributes:
+        time: (n,) [s].
+        states: (n, 28) `twin.STATES`.
+        steering: (n,) steering wheel angle [rad].
+        road: (n, 4) height under each wheel [m].
+        forces: (n, 4, 3) of the tyres in their contact frames [N]; None where nobody knows them.
+    """
+
+    time: Array
+    states: Array
+    steering: Array
+    road: Array
+    forces: Array | None
+
+
+class Poses(NamedTuple):
+    """Where the bodies of a car are over n frames, in the world.
+
+    Attributes:
+        positions: (n, nbody, 3) [m].
+        quaternions: (n, nbody, 4) w x y z.
+        wheels: (4,) ids of the wheels' bodies.
+        axes: (n, 4, 3) the wheels' spin axes, to the left.
+    """
+
+    positions: Array
+    quaternions: Array
+    wheels: NDArray[np.int64]
+    axes: Array
+
+
+def motion(drive: twin.Drive, estimate: Estimate, frames: NDArray[np.int64]) -> Motion:
+    """The real vehicle's motion at some samples; what its truth lacks is taken from the twin."""
+    unknown = np.full(len(drive), np.nan)
+
+    def truth(names: tuple[str, ...]) -> Array:
+        return np.stack([drive.truth.get(name, unknown)[frames] for name in names], axis=1)
+
+    states = truth(twin.STATES)
+    names = tuple(f"{force}_{wheel}" for wheel in twin.WHEELS for force in ("fx", "fy", "fz"))
+    forces = truth(names).reshape(-1, 4, 3)
+    return Motion(
+        time=drive.time[frames],
+        states=np.where(np.isfinite(states), states, estimate.states[frames]),
+        steering=drive.channel("steering_wheel_angle")[frames],
+        road=np.stack([drive.channel(f"road_height_{w}")[frames] for w in twin.WHEELS], axis=1),
+        forces=forces if np.isfinite(forces).all() else None,
+    )
+
+
+def poses(model: mujoco.MjModel, moved: Motion) -> Poses:
+    """Places the car's bodies at every frame. Leaves the model steered as in the last frame."""
+    data = mujoco.MjData(model)
+    wheels = np.array([model.body(f"wheel_{wheel}").id for wheel in twin.WHEELS])
+    qpos = _qpos(model, moved.states)
+    angles = _road_wheel_angles(model, wheels, moved.steering)
+    positions = np.empty((len(qpos), model.nbody, 3))
+    quaternions = np.empty((len(qpos), model.nbody, 4))
+    axes = np.empty((len(qpos), 4, 3))
+    for i in range(len(qpos)):
+        data.qpos[:] = qpos[i]
+        model.body_quat[wheels[:2], 0] = np.cos(0.5 * angles[i])
+        model.body_quat[wheels[:2], 3] = np.sin(0.5 * angles[i])
+        mujoco.mj_kinematics(model, data)
+        positions[i], quaternions[i] = data.xpos, data.xquat
+        axes[i] = data.xmat[wheels][:, 1::3]
+    return Poses(positions, quaternions, wheels, axes)
+
+
+def _qpos(model: mujoco.MjModel, states: Array) -> Array:
+    """(n, nq) coordinates of MuJoCo from (n, 28) states."""
+
+    def state(name: str) -> Array:
+        return states[:, twin.STATES.index(name)]
+
+    qpos = np.zeros((len(states), model.nq))
+    qpos[:, :3] = states[:, :3]
+    for row, angles in zip(qpos, states[:, 3:6], strict=True):
+        mujoco.mju_euler2Quat(row[3:7], np.ascontiguousarray(angles[::-1]), "zyx")
+    for wheel in twin.WHEELS:
+        qpos[:, model.joint(f"travel_{wheel}").qposadr[0]] = state(f"suspension_travel_{wheel}")
+        qpos[:, model.joint(f"spin_{wheel}").qposadr[0]] = state(f"wheel_angle_{wheel}")
+    return qpos
+
+
+def _road_wheel_angles(model: mujoco.MjModel, wheels: NDArray[np.int64], steering: Array) -> Array:
+    """(n, 2) angles of the front wheels [rad], steered as the twin steers them."""
+    hubs = model.body_pos[model.body_parentid[wheels]]
+    track, wheelbase = hubs[0, 1] - hubs[1, 1], hubs[:2, 0].mean() - hubs[2:, 0].mean()
+    tangent = np.tan(steering / model.numeric("steering_ratio").data[0])[:, None]
+    inner = 0.5 * model.numeric("ackermann").data[0] * track / wheelbase * tangent
+    return np.arctan(tangent / (1.0 - np.array([1.0, -1.0]) * inner))
+
+
+def contacts(placed: Poses, road: Array) -> tuple[Array, Array]:
+    """Where the tyres meet the road, and how their contact frames stand.
+
+    Args:
+        placed: poses of n frames.
+        road: (n, 4) height under each wheel [m].
+
+    Returns:
+        (n, 4, 3) contact points in the world [m] and (n, 4, 3, 3) frames, axes x, y, z as rows.
+    """
+    centres = placed.positions[:, placed.wheels]
+    ground = np.concatenate([centres[..., :2], road[..., None]], axis=2)
+    normal = np.cross(ground[:, 1] - ground[:, 2], ground[:, 0] - ground[:, 3])[:, None]
+    normal = np.broadcast_to(_unit(normal), centres.shape)
+    ahead = _unit(np.cross(placed.axes, normal))
+    upright = np.cross(ahead, placed.axes)
+    height = (centres[..., 2] - road) * normal[..., 2] / np.sum(upright * normal, axis=2)
+    points = centres - height[..., None] * upright
+    return points, np.stack([ahead, np.cross(normal, ahead), normal], axis=2)
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def scene(subject: str, moved: Motion) -> rrb.Spatial3DView:
+    """The view of the car on a ground grid, the eye behind its right shoulder and following it."""
+    import rerun.blueprint as rrb
+
+    start, yaw = moved.states[0, :3], moved.states[0, 5]
+    turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    forces = f", tyre forces (1 m = {NEWTONS_PER_METRE / 1000:g} kN)"
+    return rrb.Spatial3DView(
+        origin=WORLD,
+        name=subject if moved.forces is None else subject + forces,
+        background=(24, 27, 32),
+        line_grid=rrb.LineGrid3D(spacing=5.0, color=(255, 255, 255, 40)),
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital,
+            position=start + turn @ (-5.2, -3.9, 2.4),
+            look_target=start,
+            tracking_entity=f"{WORLD}/chassis/boxes",  # an eye can only follow what is drawn
+        ),
+    )
+
+
+def log_car(recording: rr.RecordingStream, model: mujoco.MjModel, moved: Motion) -> None:
+    """Logs the car's shapes, poses, path and, where they are known, tyre forces."""
+    import rerun as rr
+
+    placed = poses(model, moved)
+    points, axes = contacts(placed, moved.road)
+    recording.log(WORLD, rr.ViewCoordinates.FLU, static=True)
+    index = [rr.TimeColumn("time", duration=moved.time)]
+    for body in np.unique(model.geom_bodyid[model.geom_bodyid > 0]):
+        name = f"{WORLD}/{model.body(body).name}"
+        _log_shapes(recording, name, model, body)
+        columns = rr.Transform3D.columns(
+            translation=placed.positions[:, body],
+            quaternion=placed.quaternions[:, body][:, [1, 2, 3, 0]],
+        )
+        recording.send_columns(name, index, columns)
+    path = rr.LineStrips3D([points.mean(axis=1)], colors=_PATH_COLOUR, radii=0.04)
+    recording.log(f"{WORLD}/path", path, static=True)
+    if moved.forces is not None:
+        vectors = np.einsum("nwi,nwij->nwj", moved.forces, axes) / NEWTONS_PER_METRE
+        _log_forces(recording, index, points, vectors)
+
+
+def _log_forces(
+    recording: rr.RecordingStream, index: list[rr.TimeColumn], points: Array, vectors: Array
+) -> None:
+    import rerun as rr
+
+    entity = f"{WORLD}/tyre_forces"
+    recording.log(entity, rr.Arrows3D.from_fields(colors=_FORCE_COLOUR, radii=0.035), static=True)
+    columns = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3), origins=points.reshape(-1, 3))
+    recording.send_columns(entity, index, columns.partition(np.full(len(points), 4)))
+
+
+def _log_shapes(
+    recording: rr.RecordingStream, entity: str, model: mujoco.MjModel, body: int
+) -> None:
+    """Logs a body's boxes, cylinders and ellipsoids in its frame; other shapes are left out."""
+    import rerun as rr
+
+    for shape, types in _SHAPES.items():
+        geoms = np.flatnonzero((model.geom_bodyid == body) & np.isin(model.geom_type, types))
+        if not geoms.size:
+            continue
+        size = model.geom_size[geoms]
+        common = {
+            "centers": model.geom_pos[geoms],
+            "quaternions": model.geom_quat[geoms][:, [1, 2, 3, 0]],
+            "colors": _colours(model, geoms),
+            "fill_mode": "solid",
+        }
+        if shape == "boxes":
+            drawn = rr.Boxes3D(half_sizes=size, **common)
+        elif shape == "cylinders":
+            drawn = rr.Cylinders3D(lengths=2.0 * size[:, 1], radii=size[:, 0], **common)
+        else:
+            half = np.where(size > 0.0, size, size[:, :1])  # a sphere has but one radius
+            drawn = rr.Ellipsoids3D(half_sizes=half, **common)
+        recording.log(f"{entity}/{shape}", drawn, static=True)
+
+
+def _colours(model: mujoco.MjModel, geoms: NDArray[np.int64]) -> NDArray[np.float32]:
+    """(n, 4) red, green, blue, opacity in 0..1: those of the material where there is one."""
+    material = model.geom_matid[geoms]
+    colours = model.geom_rgba[geoms].copy()
+    colours[material >= 0] = model.mat_rgba[material[material >= 0]]
+    colours[model.geom_bodyid[geoms] == model.body("chassis").id, 3] *= _CHASSIS_OPACITY
+    return colours

@@ -1,0 +1,265 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from scenarios import __main__ as cli
+from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Entry, Scenario
+from scenarios.result import Result, Row
+from twin import TwinError
+
+ROOT = Path(__file__).parents[1]
+
+
+def make_result(name, settings, seeds, case="same"):
+    row = Row.over_seeds(
+        [float(seed) for seed in seeds],
+        case=case,
+        quantity="mass",
+        metric="rms_pct",
+        unit="%",
+        estimator="til",
+    )
+    return Result(name=name, settings=settings, seconds=0.5, rows=[row])
+
+
+def run_fake(settings):
+    if settings.duration == 13.0:
+        raise TwinError("suv.xml: mass is -1 kg,\nmust be positive")
+    if settings.duration == 14.0:
+        raise KeyboardInterrupt
+    if settings.duration == 15.0:
+        raise ZeroDivisionError
+    kept = {"snr": settings.snr, "jobs": settings.jobs, "duration": settings.duration}
+    return make_result("fake", kept, settings.seeds, case=f"{settings.snr:g}dB")
+
+
+def draw_fake(settings, path):
+    path.write_text(f"timeline of seed {settings.seeds[0]}")
+
+
+def reproduce_fake(seeds, jobs, out):
+    (out / "fake.png").write_text("picture")
+    return make_result("fake-table-1", {"jobs": jobs}, range(seeds))
+
+
+FAKE = Scenario(run=run_fake, timeline=draw_fake, default_snr=10.0)
+
+
+@pytest.fixture(autouse=True)
+def catalogue_and_folder(monkeypatch, tmp_path):
+    """A catalogue of fakes, in an empty working directory."""
+    for name in list(SCENARIOS):
+        monkeypatch.delitem(SCENARIOS, name)
+    for name in list(REPRODUCTIONS):
+        monkeypatch.delitem(REPRODUCTIONS, name)
+    monkeypatch.setitem(SCENARIOS, "fake", Entry(f"{__name__}:FAKE", "does nothing"))
+    for name in "fake-table-1", "fake-table-2":
+        entry = Entry(f"{__name__}:reproduce_fake", "a table of nothing")
+        monkeypatch.setitem(REPRODUCTIONS, name, entry)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def til(capsys):
+    def run(*args):
+        status = cli.main(args)
+        return (status, *capsys.readouterr())
+
+    return run
+
+
+def run_json(til, *args):
+    """Runs with --json -, whose standard output must be one JSON object."""
+    status, out, err = til(*args, "--json", "-")
+    assert (status, err) == (0, "")
+    return json.loads(out)
+
+
+def test_list_names_scenarios_and_reproductions_with_a_line_each(til):
+    status, out, err = til("list")
+    assert (status, err) == (0, "")
+    assert [line.split(maxsplit=1) for line in out.splitlines() if line.startswith("  ")] == [
+        ["fake", "does nothing"],
+        ["fake-table-1", "a table of nothing"],
+        ["fake-table-2", "a table of nothing"],
+    ]
+
+
+def test_run_prints_a_table_and_writes_nothing(til, tmp_path):
+    status, out, err = til("run", "fake", "--seeds", "3")
+    assert (status, err) == (0, "")
+    title, heading, _, row = out.splitlines()
+    assert title == "fake (0.5 s)"
+    assert heading.split()[-2:] == ["median", "p90"]
+    assert row.split() == ["10dB", "mass", "rms_pct", "%", "til", "3", "1.00", "1.80"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_run_without_options_is_one_seed_at_the_scenario_s_noise(til):
+    data = run_json(til, "run", "fake")
+    assert list(data) == ["name", "settings", "versions", "seconds", "rows"]
+    assert data["settings"] == {"snr": 10.0, "jobs": 1, "duration": None}
+    assert (data["rows"][0]["seeds"], data["rows"][0]["median"]) == (1, 0.0)
+
+
+def test_options_of_run_reach_the_scenario(til):
+    options = "run fake --snr 5 --seed 7 --seeds 3 --jobs 4 --duration 2.5"
+    data = run_json(til, *options.split())
+    assert data["settings"] == {"snr": 5.0, "jobs": 4, "duration": 2.5}
+    assert (data["rows"][0]["seeds"], data["rows"][0]["median"]) == (3, 8.0)
+
+
+def test_infinite_signal_to_noise_ratio_is_taken(til):
+    assert run_json(til, "run", "fake", "--snr", "inf")["rows"][0]["case"] == "infdB"
+
+
+def test_json_file_comes_beside_the_table(til, tmp_path):
+    status, out, _ = til("run", "fake", "--json", "fake.json")
+    assert status == 0
+    assert out.startswith("fake (0.5 s)\n")
+    assert json.loads((tmp_path / "fake.json").read_text())["name"] == "fake"
+
+
+def test_rrd_file_holds_the_timeline_of_the_first_seed(til, tmp_path):
+    assert til("run", "fake", "--seed", "7", "--rrd", "fake.rrd")[0] == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["fake.rrd"]
+    assert (tmp_path / "fake.rrd").read_text() == "timeline of seed 7"
+
+
+@pytest.mark.parametrize("options", [(), ("--rrd", "fake.rrd")])
+def test_view_opens_the_timeline(til, monkeypatch, options):
+    seen = []
+    monkeypatch.setattr("scenarios.timeline.view", lambda path: seen.append(path.read_text()))
+    assert til("run", "fake", "--view", *options)[0] == 0
+    assert seen == ["timeline of seed 0"]
+
+
+def test_reproduction_of_one_name_is_one_result(til, tmp_path):
+    data = run_json(til, "reproduce", "fake-table-1", "--seeds", "3", "--jobs", "2")
+    assert (data["name"], data["settings"]) == ("fake-table-1", {"jobs": 2})
+    assert data["rows"][0]["seeds"] == 3
+    assert (tmp_path / "out" / "fake.png").exists()
+
+
+def test_reproduction_of_all_is_a_list_of_results(til, tmp_path):
+    data = run_json(til, "reproduce", "--out", "a/b")
+    assert list(data) == ["results"]
+    assert [result["rows"][0]["seeds"] for result in data["results"]] == [20, 20]
+    assert (tmp_path / "a" / "b" / "fake.png").exists()
+
+
+def test_reproduction_named_twice_runs_once(til):
+    _, out, _ = til("reproduce", "fake-table-1", "fake-table-2", "fake-table-1")
+    assert out.count("fake-table-1 (0.5 s)") == 2  # both fakes give that name
+    assert len(out.split("\n\n")) == 2
+
+
+def test_bench_has_the_same_shape(til, monkeypatch):
+    monkeypatch.setattr(cli.catalogue, "bench", lambda: lambda: make_result("bench", {}, [0]))
+    assert run_json(til, "bench")["name"] == "bench"
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("", "Missing command. (see til --help)"),
+        ("drive", "No such command 'drive'. (see til --help)"),
+        ("run", "Missing argument 'NAME'. (see til run --help)"),
+        ("run lap", "no scenario 'lap', only fake"),
+        ("reproduce fake-table-1 t", "no reproduction 't', only fake-table-1, fake-table-2"),
+        ("run fake --sedes 3", "No such option '--sedes'"),
+        ("run fake --seeds 0", "0 is not in the range x>=1"),
+        ("run fake --seed -1", "-1 is not in the range x>=0"),
+        ("run fake --jobs 0", "0 is not in the range x>=1"),
+        ("reproduce --seeds 0", "0 is not in the range x>=1"),
+        ("run fake --snr loud", "'loud' is not a valid float"),
+        ("run fake --snr nan", "nan is neither a number of dB nor inf"),
+        ("run fake --snr -inf", "-inf is neither a number of dB nor inf"),
+        ("run fake --duration 0", "0 s is not positive and finite"),
+        ("run fake --duration inf", "inf s is not positive and finite"),
+        ("run fake --duration 13", "suv.xml: mass is -1 kg, must be positive"),
+        ("run fake --json none/f.json", "none/f.json cannot be written: No such file"),
+        ("run fake --rrd none/f.rrd", "none/f.rrd cannot be written: No such file"),
+        ("run fake --rrd mass.txt", "mass.txt must end in .rrd"),
+        ("bench --json /proc/f.json", "/proc/f.json cannot be written: "),
+        ("run fake --json .", "File '.' is a directory."),
+        ("reproduce --out /proc/out", "--out: /proc/out cannot be written: "),
+    ],
+)
+def test_mistake_is_one_line_and_status_2(til, tmp_path, command, message):
+    status, out, err = til(*command.split())
+    assert (status, out) == (2, "")
+    assert err.startswith("til: ")
+    assert err.endswith("\n")
+    assert len(err.splitlines()) == 1
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupt_is_one_line_and_status_130(til):
+    assert til("run", "fake", "--duration", "14") == (130, "", "til: interrupted\n")
+
+
+def test_bug_keeps_its_traceback(til):
+    with pytest.raises(ZeroDivisionError):
+        til("run", "fake", "--duration", "15")
+
+
+def test_help_is_no_mistake(til):
+    for command in ([], ["list"], ["run"], ["reproduce"], ["bench"]):
+        status, out, err = til(*command, "--help")
+        assert (status, err) == (0, "")
+        assert out.startswith(" ".join(["Usage: til", *command]))
+
+
+def test_list_imports_neither_mujoco_nor_numba_nor_numpy():
+    code = (
+        "import sys; from scenarios.__main__ import main; status = main(['list']);"
+        "print(*sys.modules); sys.exit(status)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    modules = set(run.stdout.split())
+    assert "scenarios.catalogue" in modules
+    assert modules & {"mujoco", "numba", "numpy", "joblib", "rerun"} == set()
+
+
+def test_module_runs_as_the_program_does():
+    command = [sys.executable, "-m", "scenarios", "run", "no-such-scenario"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.startswith("til: ")
+    assert "no scenario 'no-such-scenario', only mass" in run.stderr
+
+
+def test_ctrl_c_ends_parallel_work_with_one_line(tmp_path):
+    code = f"""
+import sys, time
+from scenarios import __main__ as cli, catalogue
+from scenarios.catalogue import Scenario
+from scenarios.progress import parallel
+
+def sleep(i):
+    open({str(tmp_path)!r} + f"/{{i}}", "w").close()
+    time.sleep(60)
+
+slow = Scenario(run=lambda s: parallel(sleep, s.seeds, s.jobs, "x"), timeline=None, default_snr=0)
+catalogue.scenario = lambda name: slow
+sys.exit(cli.main(["run", "mass", "--seeds", "4", "--jobs", "2"]))
+"""
+    run = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    while len(list(tmp_path.iterdir())) < 2:
+        assert run.poll() is None
+        time.sleep(0.05)
+    os.killpg(run.pid, signal.SIGINT)
+    _, err = run.communicate(timeout=30)
+    assert (run.returncode, err) == (130, "til: interrupted\n")
