@@ -37,4 +37,6 @@ class Estimate:
         ):
             if name in names:
                 return table[:, names.index(name)]
-        raise TwinError(f"estimate: has no {name!r}; has {', '.join(PARAMETERS + STATES + OUTPUTS)}")
+        raise TwinError(
+            f"estimate: has no {name!r}; has {', '.join(PARAMETERS + STATES + OUTPUTS)}"
+        )

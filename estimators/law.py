@@ -30,8 +30,17 @@ from twin import OUTPUTS, PARAMETERS, TwinError
 
 Array = NDArray[np.float64]
 
+# Signals that a law can use: what the sensors give, and the angular accelerations [rad/s2]. These
+# come from the rates by the same causal filter for vehicle and twin, s / (filter_time s + 1)^2: it
+# differentiates below its corner, and delays both by two filter times, so that the delay cancels.
+ACCELERATIONS = ("roll_acceleration", "pitch_acceleration", "yaw_acceleration")
+SIGNALS = OUTPUTS + ACCELERATIONS
+
 # Columns of a law's memory: covariance of parameter and offset, and the offset itself
 PP, PO, OO, OFFSET = range(4)
+# and of the differentiating filter: whether it has begun, its two stages for vehicle and for twin
+BEGUN, FILTER = 4, 5
+MEMORY = 9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +49,7 @@ class ParameterLaw:
 
     Attributes:
         parameter: of `twin.PARAMETERS`.
-        signal: of `twin.OUTPUTS`.
+        signal: of `SIGNALS`.
         instrument: whose signal the regressor is made of.
         form: "sign" or "least-squares", see the module.
         gain: of the sign form, unit of the parameter per second and unit of the signal.
@@ -51,6 +60,7 @@ class ParameterLaw:
             the root of Hz]: standard deviation times the root of the sample time.
         drift: of the least-squares form, of the parameter [unit over the root of s]: forgetting.
         offset_sd: of the least-squares form, of the signal's offset; zero: there is none.
+        filter_time: of the differentiating filter [s]; only angular accelerations have one.
         least_wheel_speed: the law rests while vehicle or twin is slower [rad/s]: a car held by its
             brakes tells nothing of its mass.
     """
@@ -65,13 +75,14 @@ class ParameterLaw:
     noise_density: float = 1.0
     drift: float = 0.0
     offset_sd: float = 0.0
+    filter_time: float = 0.02
     least_wheel_speed: float = 0.0
 
     def __post_init__(self) -> None:
         """Checks names and numbers."""
         for kind, name, allowed in (
             ("parameter", self.parameter, PARAMETERS),
-            ("signal", self.signal, OUTPUTS),
+            ("signal", self.signal, SIGNALS),
             ("instrument", self.instrument, ("measured", "twin")),
             ("form", self.form, ("sign", "least-squares")),
         ):
@@ -80,7 +91,7 @@ class ParameterLaw:
         for name in ("gain", "drift", "offset_sd", "least_wheel_speed"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: 0 or more")
-        for name in ("scale", "prior_sd", "noise_density"):
+        for name in ("scale", "prior_sd", "noise_density", "filter_time"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
 
@@ -89,31 +100,42 @@ class Laws(NamedTuple):
     """Parameter laws as compiled code sees them, a row each."""
 
     parameter: NDArray[np.int64]
-    signal: NDArray[np.int64]
+    output: NDArray[np.int64]
+    differentiated: NDArray[np.bool_]
     measured: NDArray[np.bool_]
     sign: NDArray[np.bool_]
     gain: Array
     scale: Array
     intensity: Array  # noise_density squared
     drift: Array
+    filter_time: Array
     least_wheel_speed: Array
 
 
+def _output(signal: str) -> int:
+    """The column of the sensor that a signal comes from."""
+    return OUTPUTS.index(signal.replace("acceleration", "rate"))
+
+
 def compile_laws(laws: Sequence[ParameterLaw]) -> tuple[Laws, Array]:
-    """The laws as arrays, and the memory (n, 4) that they start with."""
+    """The laws as arrays, and the memory (n, MEMORY) that they start with."""
     table = Laws(
         np.array([PARAMETERS.index(law.parameter) for law in laws], dtype=np.int64),
-        np.array([OUTPUTS.index(law.signal) for law in laws], dtype=np.int64),
+        np.array([_output(law.signal) for law in laws], dtype=np.int64),
+        np.array([law.signal in ACCELERATIONS for law in laws], dtype=np.bool_),
         np.array([law.instrument == "measured" for law in laws], dtype=np.bool_),
         np.array([law.form == "sign" for law in laws], dtype=np.bool_),
         np.array([law.gain for law in laws], dtype=np.float64),
         np.array([law.scale for law in laws], dtype=np.float64),
         np.array([law.noise_density**2 for law in laws], dtype=np.float64),
         np.array([law.drift for law in laws], dtype=np.float64),
+        np.array([law.filter_time for law in laws], dtype=np.float64),
         np.array([law.least_wheel_speed for law in laws], dtype=np.float64),
     )
-    memory = [[law.prior_sd**2, 0.0, law.offset_sd**2, 0.0] for law in laws]
-    return table, np.array(memory, dtype=np.float64).reshape(-1, 4)
+    memory = np.zeros((len(laws), MEMORY))
+    memory[:, PP] = [law.prior_sd**2 for law in laws]
+    memory[:, OO] = [law.offset_sd**2 for law in laws]
+    return table, memory
 
 
 @njit(cache=True)
@@ -129,19 +151,42 @@ def advance_law(laws, k, memory, y, twin_y, dt):
     Args:
         laws: all laws.
         k: the law's row.
-        memory: (4,) of this law.
+        memory: (MEMORY,) of this law.
         y: (10,) measurements.
         twin_y: (10,) outputs of the twin.
         dt: sample time [s].
     """
+    a, a_twin = y[laws.output[k]], twin_y[laws.output[k]]
+    if laws.differentiated[k]:
+        if memory[BEGUN] == 0.0:
+            memory[BEGUN] = 1.0
+            memory[FILTER : FILTER + 2] = a
+            memory[FILTER + 2 : FILTER + 4] = a_twin
+        decay = dt / (laws.filter_time[k] + dt)
+        a = _differentiate(memory[FILTER : FILTER + 2], a, decay, dt)
+        a_twin = _differentiate(memory[FILTER + 2 : FILTER + 4], a_twin, decay, dt)
     least = laws.least_wheel_speed[k]
     if least > 0.0 and not (_moving(y, least) and _moving(twin_y, least)):
         return 0.0
-    a, a_twin = y[laws.signal[k]], twin_y[laws.signal[k]]
     instrument = a if laws.measured[k] else a_twin
     if laws.sign[k]:
         return laws.gain[k] * dt * np.sign(instrument) * (a_twin - a)
-    return _fit(memory, instrument / laws.scale[k], a_twin - a, laws.intensity[k] / dt, laws.drift[k] ** 2 * dt)
+    return _fit(
+        memory,
+        instrument / laws.scale[k],
+        a_twin - a,
+        laws.intensity[k] / dt,
+        laws.drift[k] ** 2 * dt,
+    )
+
+
+@njit(cache=True)
+def _differentiate(stages, value, decay, dt):
+    """One sample of s / (filter_time s + 1)^2: two low passes, the rate of the second."""
+    stages[0] += decay * (value - stages[0])
+    change = decay * (stages[0] - stages[1])
+    stages[1] += change
+    return change / dt
 
 
 @njit(cache=True)

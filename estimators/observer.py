@@ -110,7 +110,9 @@ class Observer:
                 f"{self.twin.inputs + self.twin.outputs} in this order"
             )
         if abs(drive.dt - self.twin.dt) > 1e-9:
-            raise TwinError(f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s")
+            raise TwinError(
+                f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s"
+            )
         check_inputs(drive.inputs, "drive")
         _check_measurements(drive.measurements, "drive")
         n = len(drive)

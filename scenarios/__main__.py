@@ -128,6 +128,21 @@ def _count_option(name: str, default: int, text: str, *, least: int = 1) -> Any:
     )
 
 
+name_argument = click.argument("name", type=Name("scenario", SCENARIOS))
+snr_option = click.option(
+    "--snr",
+    type=float,
+    callback=_check_snr,
+    metavar="DB",
+    help="Signal-to-noise ratio of the sensors; inf: no noise.  [default: the scenario's]",
+)
+duration_option = click.option(
+    "--duration",
+    type=float,
+    callback=_check_duration,
+    metavar="S",
+    help="Drive only the first so many seconds.",
+)
 jobs_option = _count_option("--jobs", 1, "Processes side by side.")
 json_option = click.option(
     "--json",
@@ -154,24 +169,12 @@ def list_() -> None:
 
 
 @program.command()
-@click.argument("name", type=Name("scenario", SCENARIOS))
-@click.option(
-    "--snr",
-    type=float,
-    callback=_check_snr,
-    metavar="DB",
-    help="Signal-to-noise ratio of the sensors; inf: no noise.  [default: the scenario's]",
-)
+@name_argument
+@snr_option
 @_count_option("--seed", 0, "First seed.", least=0)
 @_count_option("--seeds", 1, "How many seeds, counted up from the first.")
 @jobs_option
-@click.option(
-    "--duration",
-    type=float,
-    callback=_check_duration,
-    metavar="S",
-    help="Drive only the first so many seconds.",
-)
+@duration_option
 @click.option(
     "--rrd", type=OutputFile(suffix=".rrd"), metavar="FILE", help="Write the Rerun timeline."
 )
@@ -243,20 +246,40 @@ def reproduce(
 
 
 @program.command()
+@name_argument
+@snr_option
+@duration_option
+@json_option
+def limits(name: str, snr: float | None, duration: float | None, json_path: Path | None) -> None:
+    """Bound what the drive of scenario NAME can tell of the load at all.
+
+    Shows the least standard deviation that an unbiased estimator can have (Cramer-Rao), of each
+    parameter singly and of all jointly, and how the joint errors are correlated.
+    """
+    scenario = catalogue.scenario(name)
+    settings = Settings(
+        snr=scenario.default_snr if snr is None else snr, seeds=(0,), jobs=1, duration=duration
+    )
+    result, text = catalogue.limits()(name, scenario, settings)
+    _report(result, json_path, text)
+
+
+@program.command()
 @json_option
 def bench(json_path: Path | None) -> None:
     """Measure the speed, as ratios taken side by side."""
     _report(catalogue.bench()(), json_path)
 
 
-def _report(result: Result, json_path: Path | None) -> None:
+def _report(result: Result, json_path: Path | None, text: str | None = None) -> None:
+    """Shows the text, or the rows if there is none, and saves the rows."""
     if json_path != STANDARD_OUTPUT:
-        _print_table(result)
+        _print_table(result, text)
     _save(result.to_json(), json_path)
 
 
-def _print_table(result: Result) -> None:
-    click.echo(f"{result.name} ({result.seconds:.1f} s)\n{result.table()}")
+def _print_table(result: Result, text: str | None = None) -> None:
+    click.echo(f"{result.name} ({result.seconds:.1f} s)\n{text or result.table()}")
 
 
 def _save(data: dict[str, Any], json_path: Path | None) -> None:

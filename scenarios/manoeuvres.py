@@ -41,6 +41,4 @@ def urban(dt: float = 0.001, duration: float | None = None) -> Manoeuvre:
             speed[now] = before + (after - before) * 0.5 * (1.0 - np.cos(np.pi * share))
             before = after
         start += seconds
-    return Manoeuvre(
-        name="urban", dt=dt, speed=speed, steering=np.zeros(n), road=np.zeros((n, 4))
-    )
+    return Manoeuvre(name="urban", dt=dt, speed=speed, steering=np.zeros(n), road=np.zeros((n, 4)))

@@ -100,7 +100,8 @@ def _truth(vehicle: Vehicle, states: Array, outputs: Array, tyres: Array) -> dic
     body = vehicle.chassis()
     values = (body.mass, *body.cm, *np.diag(body.inertia), *body.inertia[[0, 0, 1], [1, 2, 2]])
     truth |= {
-        name: np.full(states.shape[0], value) for name, value in zip(PARAMETERS, values, strict=True)
+        name: np.full(states.shape[0], value)
+        for name, value in zip(PARAMETERS, values, strict=True)
     }
     for w, wheel in enumerate(WHEELS):
         truth |= {f"{name}_{wheel}": tyres[:, w, i] for i, name in enumerate(TYRE_OUTPUTS)}

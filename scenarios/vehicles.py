@@ -35,8 +35,14 @@ def suv_loaded_mjcf() -> str:
     end = "    </body>\n  </worldbody>"
     return (
         text.replace('<mujoco model="suv">', '<mujoco model="suv_loaded">')
-        .replace("<!-- A large", "<!-- Made from suv.xml by scenarios/vehicles.py: with the loads of TiL Table 2.\n\n  A large")
-        .replace(end, f"\n      <!-- TiL Table 2, point masses; their places are chosen. -->\n{bodies}{end}")
+        .replace(
+            "<!-- A large",
+            "<!-- Made from suv.xml by scenarios/vehicles.py: with the loads of TiL Table 2.\n\n  A large",
+        )
+        .replace(
+            end,
+            f"\n      <!-- TiL Table 2, point masses; their places are chosen. -->\n{bodies}{end}",
+        )
     )
 
 

@@ -48,7 +48,19 @@ def reproduce_fake(seeds, jobs, out):
     return make_result("fake-table-1", {"jobs": jobs}, range(seeds))
 
 
-FAKE = Scenario(run=run_fake, timeline=draw_fake, default_snr=10.0)
+def limit_fake(name, scenario, settings):
+    kept = {"snr": settings.snr, "duration": settings.duration}
+    return make_result(f"limits of {name}", kept, [1]), f"bounds at {settings.snr:g} dB"
+
+
+FAKE = Scenario(
+    run=run_fake,
+    timeline=draw_fake,
+    default_snr=10.0,
+    vehicle="suv",
+    drive=lambda settings: None,
+    variation=dict,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -165,6 +177,23 @@ def test_bench_has_the_same_shape(til, monkeypatch):
     assert run_json(til, "bench")["name"] == "bench"
 
 
+@pytest.fixture
+def limits(monkeypatch):
+    monkeypatch.setattr(cli.catalogue, "limits", lambda: limit_fake)
+
+
+@pytest.mark.usefixtures("limits")
+def test_limits_are_shown_as_text_at_the_scenario_s_noise(til):
+    assert til("limits", "fake") == (0, "limits of fake (0.5 s)\nbounds at 10 dB\n", "")
+
+
+@pytest.mark.usefixtures("limits")
+def test_options_of_limits_reach_what_gives_them(til):
+    data = run_json(til, "limits", "fake", "--snr", "5", "--duration", "2.5")
+    assert data["settings"] == {"snr": 5.0, "duration": 2.5}
+    assert len(data["rows"]) == 1
+
+
 @pytest.mark.parametrize(
     ("command", "message"),
     [
@@ -172,6 +201,8 @@ def test_bench_has_the_same_shape(til, monkeypatch):
         ("drive", "No such command 'drive'. (see til --help)"),
         ("run", "Missing argument 'NAME'. (see til run --help)"),
         ("run lap", "no scenario 'lap', only fake"),
+        ("limits lap", "no scenario 'lap', only fake"),
+        ("limits fake --snr inf", "limits: snr is inf; allowed: a number of dB"),
         ("reproduce fake-table-1 t", "no reproduction 't', only fake-table-1, fake-table-2"),
         ("run fake --sedes 3", "No such option '--sedes'"),
         ("run fake --seeds 0", "0 is not in the range x>=1"),
@@ -212,7 +243,7 @@ def test_bug_keeps_its_traceback(til):
 
 
 def test_help_is_no_mistake(til):
-    for command in ([], ["list"], ["run"], ["reproduce"], ["bench"]):
+    for command in ([], ["list"], ["run"], ["reproduce"], ["limits"], ["bench"]):
         status, out, err = til(*command, "--help")
         assert (status, err) == (0, "")
         assert out.startswith(" ".join(["Usage: til", *command]))
@@ -249,7 +280,10 @@ def sleep(i):
     open({str(tmp_path)!r} + f"/{{i}}", "w").close()
     time.sleep(60)
 
-slow = Scenario(run=lambda s: parallel(sleep, s.seeds, s.jobs, "x"), timeline=None, default_snr=0)
+slow = Scenario(
+    run=lambda s: parallel(sleep, s.seeds, s.jobs, "x"),
+    timeline=None, default_snr=0, vehicle="suv", drive=None, variation=None,
+)
 catalogue.scenario = lambda name: slow
 sys.exit(cli.main(["run", "mass", "--seeds", "4", "--jobs", "2"]))
 """

@@ -11,7 +11,10 @@ ROOT = Path(__file__).parents[1]
 # Each room imports only those to its left.
 ROOMS = ("models", "twin", "estimators", "scenarios")
 # Besides the public names of twin, what an observer's compiled loop may call
-BOUNDARY = {f"twin.kernel.{name}" for name in ("Car", "step", "correct", "set_parameters")}
+BOUNDARY = {
+    f"twin.kernel.{name}"
+    for name in ("Car", "step", "correct", "set_parameters", "read_states", "is_sound")
+}
 PUBLIC = {f"twin.{name}" for name in twin.__all__} | BOUNDARY
 HEAVY = {"skopt", "rerun", "pyarrow", "matplotlib", "scipy.optimize"}
 

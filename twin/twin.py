@@ -16,6 +16,7 @@ from twin.tyre import effective_radius
 from twin.vehicle import SENSORS, Vehicle
 
 Array = NDArray[np.float64]
+SETTLING_STEPS = 20
 LARGEST_TORQUE = 1e5  # [N m], far beyond what a wheel ever sees
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -68,8 +69,6 @@ class Twin:
         Raises:
             TwinError: the car has no such equilibrium, for example as it is too heavy.
         """
-        from scipy.optimize import root
-
         if not 0.0 <= speed <= 150.0:
             raise TwinError(f"reset: speed is {speed} m/s; allowed: 0 to 150")
         u = np.zeros(len(INPUTS))
@@ -85,14 +84,19 @@ class Twin:
             kernel.step(self.car, u, np.empty(len(OUTPUTS)))
             return self.data.qacc[rest]
 
-        for _ in range(3):  # the rolling radius hangs on the load, if weakly
-            found = root(accelerations, pose, tol=1e-13)
-            pose = found.x
-            loads = self.car.tyre_output[:, 2]
+        # Newton's method: scipy's root would keep this twin and its memory alive in a cycle
+        for _ in range(SETTLING_STEPS):
+            rates = accelerations(pose)
+            residual = np.abs(rates).max()
+            if not 1e-9 < residual < np.inf:
+                break
+            slopes = [(accelerations(pose + dp) - rates) / 1e-6 for dp in 1e-6 * np.eye(7)]
+            pose -= np.linalg.solve(np.transpose(slopes), rates)
+            accelerations(pose)
+            loads = self.car.tyre_output[:, 2]  # the rolling radius hangs on them, if weakly
             spin[:] = [
                 speed / effective_radius(t, z) for t, z in zip(self.car.tyres, loads, strict=True)
             ]
-        residual = np.abs(accelerations(pose)).max()
         if not residual < 1e-3:
             raise TwinError(
                 f"{self.vehicle.source}: the car does not settle on its wheels at {speed} m/s; "
