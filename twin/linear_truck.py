@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, expm
+from scipy.linalg import expm
 
 from twin.truck_parameters import SprungMass, TruckParameters, per_wheel
 
@@ -45,10 +45,13 @@ def state_space(truck: TruckParameters, load: SprungMass | None = None) -> State
     stiffness = deflection.T @ spring @ deflection + axle_height.T @ tyre @ axle_height
     damping = deflection.T @ damper @ deflection
     input_force = axle_height.T @ tyre
-    a = np.block([[np.zeros((7, 7)), np.eye(7)],
-                  [-stiffness / mass[:, None], -damping / mass[:, None]]])
+    a = np.block(
+        [[np.zeros((7, 7)), np.eye(7)], [-stiffness / mass[:, None], -damping / mass[:, None]]]
+    )
     b = np.vstack([np.zeros((7, 4)), input_force / mass[:, None]])
-    return StateSpace(a, b, block_diag(deflection, deflection))
+    empty = np.zeros_like(deflection)
+    output = np.block([[deflection, empty], [empty, deflection]])
+    return StateSpace(a, b, output)
 
 
 def simulate(system: StateSpace, road_heights: Array, sample_time: float) -> Array:

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 
 from twin.errors import TwinError
@@ -76,7 +75,7 @@ def iso8608_road(
         raise TwinError(f"road length: {length} m, must be at least {1 / SPATIAL_BAND[0]:.0f} m")
     if not coherence_decay >= 0:
         raise TwinError(f"road coherence_decay: {coherence_decay} m, must not be negative")
-    n_points = next_fast_len(int(np.ceil(length / _SPACING)), real=True)
+    n_points = int(np.ceil(length / _SPACING))
     frequency = np.fft.rfftfreq(n_points, _SPACING)
     in_band = (frequency >= SPATIAL_BAND[0]) & (frequency <= SPATIAL_BAND[1])
     n = frequency[in_band]

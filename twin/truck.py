@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
-import mujoco.rollout
 import numpy as np
+from mujoco import rollout
 from numpy.typing import NDArray
 
 import models
@@ -116,11 +116,11 @@ class Truck:
             self.set_load(load)
             force = noise[first:last] * self._inertias(load)
             control = np.hstack([road_heights[first:last], force])
-            after, sensed = mujoco.rollout.rollout(
+            after, sensed = rollout.rollout(
                 self.model, data, states[-1][-1], control, control_spec=_CONTROL
             )
-            states.append(after[0])
-            sensors.append(sensed[0])
+            states.append(np.asarray(after)[0])
+            sensors.append(np.asarray(sensed)[0])
             truth.append(np.tile(load.parameters, (last - first, 1)))
         return self._collect(road_heights, states, sensors, truth)
 
@@ -142,9 +142,7 @@ class Truck:
             velocities=state[:, 1 + dof : 1 + 2 * dof],
         )
 
-    def _segments(
-        self, stages: Sequence[LoadStage], n: int
-    ) -> list[tuple[int, int, SprungMass]]:
+    def _segments(self, stages: Sequence[LoadStage], n: int) -> list[tuple[int, int, SprungMass]]:
         starts = [0, *(round(stage.start / self.model.opt.timestep) for stage in stages), n]
         loads = [self.parameters.nominal, *(stage.load for stage in stages)]
         if starts != sorted(starts):

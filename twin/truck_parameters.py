@@ -86,8 +86,9 @@ class TruckParameters:
     def excitation(self) -> NDArray[np.float64]:
         """H_2 of Eq. (6): [N, N m, N m] per four deflections [m] and rates [m/s]. Shape (3, 8)."""
         geometry = self.body_geometry().T
-        return -np.hstack([geometry * per_wheel(self.spring_stiffness),
-                           geometry * per_wheel(self.damping)])
+        return -np.hstack(
+            [geometry * per_wheel(self.spring_stiffness), geometry * per_wheel(self.damping)]
+        )
 
     def static_spring_loads(self, gravity: float) -> NDArray[np.float64]:
         """What each spring carries at rest under the nominal load [N]. Shape (4,)."""
