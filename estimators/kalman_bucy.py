@@ -44,7 +44,7 @@ class KalmanBucySettings:
     parametrisation: Literal["p", "1/p", "log p"] = "1/p"
     measurement_density: tuple[float, float, float] = (5e-5, 5e-4, 5e-4)
     velocity_density: float = 1.0
-    parameter_density: float = 2000.0
+    parameter_density: float = 1500.0
     start: tuple[float, float, float] = (2.0, 2.0, 2.0)
     start_deviation: float = 1.0
     bounds: tuple[float, float] = (0.05, 20.0)
@@ -93,7 +93,7 @@ def matched(
     sensor_deviation: tuple[float, float, float],
     sample_time: float,
     *,
-    parameter_density: float = 1e-3,
+    parameter_density: float = 1.5e-3,
 ) -> KalmanBucySettings:
     """Settings with R from the sensors: a sample has the variance R / dt = sensor_deviation^2.
 
