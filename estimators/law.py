@@ -13,8 +13,8 @@ mass, and a correction has the form
   The twin's own signal carries no measurement noise, and the law is unbiased.
 * the *form*: "sign", z = sgn(.), with a constant gain as in the paper; or "least-squares", z = the
   signal itself with the gains of a recursive least-squares fit with forgetting: the Kalman filter
-  of e = (a~ / scale) missing + offset + noise. The offset, a bias of the sensor or gravity seen by a
-  car that stands otherwise than its twin, is fitted along so that it does not pull the parameter.
+  of e = (a~ / scale) missing + offset + noise. The offset, a bias of the sensor or gravity seen by
+  a car that stands otherwise than its twin, is fitted along: it does not pull the parameter.
 """
 
 import math

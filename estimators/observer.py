@@ -125,8 +125,8 @@ class Observer:
         )  # fmt: skip
         if done < n:
             raise TwinError(
-                f"drive: the twin blew up at t = {drive.time[done]:.3f} s; the gains are too high, or "
-                "the inputs are none that this car can follow"
+                f"drive: the twin blew up at t = {drive.time[done]:.3f} s; the gains are too "
+                "high, or the inputs are none that this car can follow"
             )
         return Estimate(
             time=drive.time,
@@ -192,5 +192,6 @@ def _check_measurements(y: Array, what: str) -> None:
     if not np.isfinite(y).all():
         row, column = np.argwhere(~np.isfinite(y))[0]
         raise TwinError(
-            f"{what}: {OUTPUTS[column]} is {y[row, column]} in sample {row}; allowed: finite numbers"
+            f"{what}: {OUTPUTS[column]} is {y[row, column]} in sample {row}; "
+            "allowed: finite numbers"
         )

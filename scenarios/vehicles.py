@@ -37,7 +37,7 @@ def suv_loaded_mjcf() -> str:
         text.replace('<mujoco model="suv">', '<mujoco model="suv_loaded">')
         .replace(
             "<!-- A large",
-            "<!-- Made from suv.xml by scenarios/vehicles.py: with the loads of TiL Table 2.\n\n  A large",
+            "<!-- Made from suv.xml by scenarios/vehicles.py: TiL Table 2's loads.\n\n  A large",
         )
         .replace(
             end,

@@ -3,7 +3,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimators.law import ParameterLaw
 from estimators.observer import Observer
 from scenarios import mass
 from scenarios.manoeuvres import urban
@@ -46,7 +45,7 @@ def test_each_mass_law_converges_without_noise(clean, law):
     til.reset(0.0, known())
     error = til.run(clean)["mass"] - 355.0
     assert error[0] < -350.0
-    assert abs(error[-1]) < 0.4 * 355.0 if law == "til-paper" else abs(error[-1]) < 4.0
+    assert abs(error[-1]) < {"til": 0.01, "til-paper": 0.6}[law] * 355.0
 
 
 def test_gain_with_the_printed_sign_would_run_away(clean):
@@ -179,7 +178,7 @@ def test_measurement_that_is_no_number_is_named(drive):
 def test_torque_beyond_any_car_is_named(drive):
     bad = drive.inputs.copy()
     bad[3, 1] = 1e9
-    with pytest.raises(TwinError, match="drive_torque_fl is 1000000000.0 in sample 3"):
+    with pytest.raises(TwinError, match=r"drive_torque_fl is 1000000000\.0 in sample 3"):
         observer().run(drive.replace(inputs=bad))
 
 
@@ -191,7 +190,7 @@ def test_gain_that_diverges_is_one_clear_error(clean):
 
 
 def test_drive_of_another_sample_time_is_refused(drive):
-    with pytest.raises(TwinError, match="samples every 0.002"):
+    with pytest.raises(TwinError, match=r"samples every 0\.002"):
         observer().run(drive.replace(time=2.0 * drive.time))
 
 

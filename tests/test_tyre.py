@@ -30,9 +30,7 @@ def symmetric(**changes):
 
 
 def forces(tyre, fz, *, kappa=0.0, alpha=0.0, gamma=0.0, vx=20.0, side=1.0):
-    out = np.full(5, np.nan)
-    magic_formula(tyre, fz, kappa, alpha, gamma, vx, side, out)
-    return out
+    return np.array(magic_formula(tyre, fz, kappa, alpha, gamma, vx, side))
 
 
 def slope(index, tyre, fz, name, step=1e-5):
@@ -284,14 +282,13 @@ def test_effective_radius_lies_between_the_loaded_and_the_free_radius():
 
 def test_tyres_of_an_array_are_read_in_compiled_code():
     @njit
-    def lateral_forces(tyres, out, result):
+    def lateral_forces(tyres, result):
         for wheel in range(4):
-            magic_formula(tyres[wheel], 5000.0, 0.0, 0.05, 0.0, 20.0, 1.0, out)
-            result[wheel] = out[1]
+            result[wheel] = magic_formula(tyres[wheel], 5000.0, 0.0, 0.05, 0.0, 20.0, 1.0)[1]
 
     result = np.zeros(4)
     tyres = np.array([suv(lmuy=friction) for friction in (1.0, 0.8, 0.6, 0.4)])
-    lateral_forces(tyres, np.zeros(5), result)
+    lateral_forces(tyres, result)
     assert np.array_equal(result, [forces(tyre, 5000.0, alpha=0.05)[1] for tyre in tyres])
 
 

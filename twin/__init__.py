@@ -1,12 +1,27 @@
-"""The black box: a vehicle in MuJoCo, its tyres, loads, sensors and recorded drives."""
+"""The black box: a vehicle in MuJoCo, its tyres, loads, sensors and recorded drives.
+
+What needs MuJoCo and compiled code is imported when it is first asked for.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from twin.channels import INPUTS, OUTPUTS, STATES, TYRE_OUTPUTS, WHEELS
 from twin.drive import Drive
 from twin.errors import TwinError
 from twin.load import PARAMETERS, PointMass, RigidBody, loaded, parameter_deltas
 from twin.noise import noise_sd, with_noise
-from twin.twin import Snapshot, Twin, check_inputs
-from twin.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from twin.twin import Snapshot, Twin, check_inputs
+    from twin.vehicle import Vehicle
+
+_COMPILED = {
+    "Snapshot": "twin.twin",
+    "Twin": "twin.twin",
+    "Vehicle": "twin.vehicle",
+    "check_inputs": "twin.twin",
+}
 
 __all__ = [
     "INPUTS",
@@ -28,3 +43,10 @@ __all__ = [
     "parameter_deltas",
     "with_noise",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports a name of `_COMPILED` (PEP 562)."""
+    if name not in _COMPILED:
+        raise AttributeError(f"module 'twin' has no attribute {name!r}")
+    return getattr(import_module(_COMPILED[name]), name)

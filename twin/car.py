@@ -1,65 +1,69 @@
-"""What compiled code sees of a car: addresses, numpy views and constants, in one named tuple."""
-
-from typing import NamedTuple
+"""What compiled code sees of a car, in one record: addresses, ids, constants and tyre states."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numba import from_dtype
 
-Array = NDArray[np.float64]
+from twin.channels import OUTPUTS, TYRE_OUTPUTS, WHEELS
+from twin.load import PARAMETERS
+from twin.tir import TYRE_DTYPE
+
+# Arrays of MjData (state, kinematics, sensors) and MjModel (inertia, steering), by MuJoCo's names;
+# the record holds their addresses.
+DATA_VIEWS = (
+    *("qpos", "qvel", "xpos", "xmat", "xaxis", "cvel", "subtree_com"),
+    *("qfrc_applied", "sensordata"),
+)
+MODEL_VIEWS = (
+    *("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_subtreemass", "body_quat"),
+)
+_PER_WHEEL = (len(WHEELS),)
+
+CAR_DTYPE = np.dtype(
+    [
+        *((name, np.int64) for name in ("model", "data", *DATA_VIEWS, *MODEL_VIEWS)),
+        # where things are, ids of MuJoCo
+        ("chassis", np.int64),
+        ("wheel", np.int64, _PER_WHEEL),  # 0 to 3
+        ("wheel_body", np.int64, _PER_WHEEL),
+        ("travel_joint", np.int64, _PER_WHEEL),
+        ("travel_qpos", np.int64, _PER_WHEEL),
+        ("travel_dof", np.int64, _PER_WHEEL),
+        ("spin_qpos", np.int64, _PER_WHEEL),
+        ("spin_dof", np.int64, _PER_WHEEL),
+        ("sensor", np.int64, (len(OUTPUTS),)),  # address of each output
+        # constants
+        ("dt", np.float64),  # step [s]
+        ("wheelbase", np.float64),  # [m]
+        ("track", np.float64),  # [m]
+        ("steering_ratio", np.float64),
+        ("ackermann", np.float64),
+        ("drag_area", np.float64),  # [m2]
+        ("spin_inertia", np.float64, _PER_WHEEL),  # of each wheel about its axis [kg m2]
+        ("nominal", np.float64, (len(PARAMETERS),)),  # the unloaded chassis
+        ("compiled_inertia", np.float64, (7,)),  # principal moments, and their axes' quaternion
+        ("other_mass", np.float64, (2,)),  # of the world's and the chassis' trees, without chassis
+        ("side", np.float64, _PER_WHEEL),  # 1 for a tyre as measured, -1 for a mirrored one
+        ("tyres", np.float64, (len(TYRE_DTYPE.names or ()), *_PER_WHEEL)),  # see `twin.four_tyres`
+        # ours, not MuJoCo's
+        ("tyre_state", np.float64, (*_PER_WHEEL, 3)),  # see `twin.contact`
+        ("tyre_output", np.float64, (*_PER_WHEEL, len(TYRE_OUTPUTS))),
+        ("parameters", np.float64, (len(PARAMETERS),)),  # deltas in force
+        # room to find the principal axes of the chassis
+        ("tensor", np.float64, (3, 3)),
+        ("vectors", np.float64, (3, 3)),
+        ("moments", np.float64, (3,)),
+    ],
+    align=True,
+)
+"""A simulated car as `twin.kernel` sees it; the `Twin` that made it owns what it points to."""
+
+Car = np.record
+CAR = from_dtype(CAR_DTYPE)  # its type in compiled code
 
 
-class Car(NamedTuple):
-    """A simulated car as `twin.kernel` sees it; the `Twin` that made it owns what it points to.
-
-    Views on MuJoCo's arrays carry MuJoCo's names.
-    """
-
-    model: int  # addresses of MjModel and MjData
-    data: int
-    # state and kinematics, views on MjData
-    qpos: Array
-    qvel: Array
-    xpos: Array
-    xmat: Array
-    xaxis: Array
-    cvel: Array
-    subtree_com: Array
-    qfrc_applied: Array
-    sensordata: Array
-    # inertia and steering, views on MjModel
-    body_mass: Array
-    body_ipos: Array
-    body_inertia: Array
-    body_iquat: Array
-    body_subtreemass: Array
-    body_quat: Array
-    # where things are, ids of MuJoCo
-    chassis: int
-    wheel_body: NDArray[np.int64]  # (4,)
-    travel_joint: NDArray[np.int64]  # (4,)
-    travel_qpos: NDArray[np.int64]  # (4,)
-    travel_dof: NDArray[np.int64]  # (4,)
-    spin_qpos: NDArray[np.int64]  # (4,)
-    spin_dof: NDArray[np.int64]  # (4,)
-    sensor: NDArray[np.int64]  # (10,) address of each output
-    # constants
-    dt: float  # step [s]
-    wheelbase: float  # [m]
-    track: float  # [m]
-    steering_ratio: float
-    ackermann: float
-    drag_area: float  # [m2]
-    spin_inertia: Array  # (4,) of each wheel about its axis [kg m2]
-    nominal: Array  # (10,) mass, CM and inertia tensor of the unloaded chassis
-    side: Array  # (4,) 1 for a tyre as measured, -1 for a mirrored one
-    # ours, not MuJoCo's
-    tyres: NDArray[np.void]  # (4,) coefficients, `twin.tir.TYRE_DTYPE`
-    tyre_state: Array  # (4, 3) deflection along and across [m], last road height [m]
-    tyre_output: Array  # (4, 9) see `twin.channels.TYRE_OUTPUTS`
-    parameters: Array  # (10,) deltas in force, see `twin.load.PARAMETERS`
-    scratch: Array  # (32,)
-
-
-_views = list(Car._fields)
-DATA_VIEWS = tuple(_views[_views.index("qpos") : _views.index("sensordata") + 1])
-MODEL_VIEWS = tuple(_views[_views.index("body_mass") : _views.index("body_quat") + 1])
+def new_car(**fields: object) -> Car:
+    """A car of these fields, the others zero."""
+    car = np.zeros(1, np.dtype((np.record, CAR_DTYPE)))
+    for name, value in fields.items():
+        car[name] = value
+    return car[0]

@@ -13,6 +13,8 @@ import math
 
 from numba import njit
 
+from twin.elementary import asin, atan, clip, cos, exp
+from twin.lanes import absolute, anywhere, inlined, maximum, sqrt, where
 from twin.tyre import effective_radius, magic_formula, relaxation_lengths, slip_stiffnesses
 
 # Below this speed [m/s] a rolling tyre no longer damps its own deflection (Pacejka Eq. 8.131).
@@ -23,25 +25,32 @@ LOW_SPEED_DAMPING_RATIO = 0.25
 # At low speed the deflection is bounded to so many times the slip at which a linear tyre would
 # reach the limit of friction (Pacejka, Section 8.6).
 LARGEST_DEFLECTION = 3.0
+LEAST_ROLLED = 1e-8  # of a relaxation length in a step: below, the decay drowns in rounding
 GRAVITY = 9.81  # [m/s2], to turn a wheel load into the mass it carries
 
 # Columns of the tyre state
 LONGITUDINAL, LATERAL, ROAD = range(3)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def dot(a, b):
     """Inner product of two 3-tuples."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def cross(a, b):
     """Vector product of two 3-tuples."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
+def difference(a, b):
+    """The 3-tuple a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@inlined
 def combine(p, a, q, b, r, c):
     """The 3-tuple p a + q b + r c."""
     return (
@@ -51,97 +60,115 @@ def combine(p, a, q, b, r, c):
     )
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def relax(deflection, slip_speed, speed, length, dt):
     """Advances du/dt = slip_speed - |v_x| u / length by dt, exactly for constant speeds."""
     rolled = speed * dt / length
-    if rolled < 1e-8:
-        return deflection + slip_speed * dt
-    decay = math.exp(-rolled)
-    return deflection * decay + slip_speed * dt * (1.0 - decay) / rolled
+    rolled = where(rolled < LEAST_ROLLED, 0.0, rolled)
+    decay = exp(-rolled)
+    mean = where(rolled > 0.0, (1.0 - decay) / rolled, 1.0)  # of the decay over the step
+    return deflection * decay + slip_speed * dt * mean
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def bounded(new, old, limit):
     """A deflection beyond the limit may shrink, not grow."""
-    bound = max(limit, abs(old))
-    return min(max(new, -bound), bound)
+    bound = maximum(limit, absolute(old))
+    return clip(new, -bound, bound)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def wheel_contact(tyre, side, state, centre, axis, velocity, rate, normal, road, dt, out):
-    """The force and moment of the road on one wheel.
+@njit(cache=True, error_model="numpy")
+def wheel_contact(tyre, side, state, centre, axis, velocity, rate, normal, road, road_rate, dt):
+    """The force and moment of the road on a wheel, or on four wheels at once.
 
     Args:
-        tyre: coefficients, a record of `twin.tir.TYRE_DTYPE`.
+        tyre: coefficients, see `twin.tyre`.
         side: 1 for a tyre mounted as measured, -1 for a mirrored one.
-        state: (3,) deflections along and across [m] and the last road height [m]; advanced by dt.
+        state: deflections along and across [m].
         centre: wheel centre in the world [m], 3-tuple like all that follow.
         axis: spin axis in the world, to the left, of unit length.
         velocity: of the wheel centre in the world [m/s].
         rate: angular velocity of the wheel in the world [rad/s].
         normal: of the road in the world, of unit length.
         road: height of the road under the wheel [m].
+        road_rate: its rate of change [m/s].
         dt: step [s].
-        out: (9,) receives what `twin.channels.TYRE_OUTPUTS` names.
 
     Returns:
-        Force [N] and moment about the wheel centre [N m], in the world.
+        Force [N] and moment about the wheel centre [N m], in the world; the deflections after dt;
+        what `twin.channels.TYRE_OUTPUTS` names.
     """
     ahead = cross(axis, normal)
-    length = math.sqrt(dot(ahead, ahead))
+    length = sqrt(dot(ahead, ahead))
     ahead = (ahead[0] / length, ahead[1] / length, ahead[2] / length)
     left = cross(normal, ahead)
     upright = cross(ahead, axis)  # in the wheel's plane, away from the road
     cos_camber = dot(upright, normal)
 
-    road_rate = (road - state[ROAD]) / dt
-    state[ROAD] = road
     loaded_radius = (centre[2] - road) * normal[2] / cos_camber
     squeeze = (tyre.unloaded_radius - loaded_radius) * cos_camber
-    squeeze_rate = (road_rate - velocity[2]) * normal[2] - (
-        velocity[0] * normal[0] + velocity[1] * normal[1]
-    )
+    squeeze_rate = (road_rate - velocity[2]) * normal[2]  # the road's rate holds its grade
     load = tyre.vertical_stiffness * squeeze + tyre.vertical_damping * squeeze_rate
-    if squeeze <= 0.0 or load <= 0.0:
-        state[LONGITUDINAL] = 0.0
-        state[LATERAL] = 0.0
-        out[:] = 0.0
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    load = where(squeeze > 0.0, maximum(load, 0.0), 0.0)
 
     arm = (-loaded_radius * upright[0], -loaded_radius * upright[1], -loaded_radius * upright[2])
     forward_speed = dot(velocity, ahead)
-    speed = abs(forward_speed)
     rolling_radius = effective_radius(tyre, load)
     slip_x = forward_speed - dot(rate, axis) * rolling_radius
     slip_y = dot(velocity, left) + dot(cross(rate, arm), left)
-    camber = math.asin(min(max(dot(axis, normal), -1.0), 1.0))
+    camber = asin(dot(axis, normal))
 
-    sigma_x, sigma_y = relaxation_lengths(tyre, load, camber)
-    stiffness_x, stiffness_y = slip_stiffnesses(tyre, load, camber)
-    u = relax(state[LONGITUDINAL], -slip_x, speed, sigma_x, dt)
-    v = relax(state[LATERAL], slip_y, speed, sigma_y, dt)
-    kappa, tan_alpha = u / sigma_x, v / sigma_y
-    if speed < LOW_SPEED:
-        u = bounded(u, state[LONGITUDINAL], LARGEST_DEFLECTION * sigma_x * load / stiffness_x)
-        v = bounded(v, state[LATERAL], LARGEST_DEFLECTION * sigma_y * load / stiffness_y)
-        fade = LOW_SPEED_DAMPING_RATIO * (1.0 + math.cos(math.pi * speed / LOW_SPEED))
-        mass = load / GRAVITY
-        kappa = (u - fade * slip_x * math.sqrt(mass * sigma_x / stiffness_x)) / sigma_x
-        tan_alpha = (v + fade * slip_y * math.sqrt(mass * sigma_y / stiffness_y)) / sigma_y
-    state[LONGITUDINAL] = u
-    state[LATERAL] = v
-
-    alpha = math.atan(tan_alpha)
-    wrench = out[:6]
-    magic_formula(tyre, load, kappa, alpha, camber, forward_speed, side, wrench)
-    fx, fy, mx, my, mz = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4]
+    u, v, kappa, tan_alpha = transient_slip(
+        tyre, state, load, camber, forward_speed, slip_x, slip_y, dt
+    )
+    alpha = atan(tan_alpha)
+    fx, fy, mx, my, mz = magic_formula(tyre, load, kappa, alpha, camber, forward_speed, side)
     # Without slip a tyre passes on all power: the torque of F_x has the arm that its speed has.
-    my -= fx * (rolling_radius - loaded_radius)
-    out[0], out[1], out[2], out[3], out[4], out[5] = fx, fy, load, mx, my, mz
-    out[6], out[7], out[8] = kappa, alpha, camber
+    my = my - fx * (rolling_radius - loaded_radius)
 
     force = combine(fx, ahead, fy, left, load, normal)
     moment = combine(mx, ahead, my, left, mz, normal)
-    lever = cross(arm, force)
-    return force, (moment[0] + lever[0], moment[1] + lever[1], moment[2] + lever[2])
+    moment = combine(1.0, moment, 1.0, cross(arm, force), 0.0, arm)
+    return (
+        force,
+        moment,
+        (u, v),
+        (
+            *(fx, fy, load, mx, my, mz),
+            *(kappa, alpha, where(load > 0.0, camber, 0.0)),
+        ),
+    )
+
+
+@inlined
+def transient_slip(tyre, state, load, camber, forward_speed, slip_x, slip_y, dt):
+    """Deflections along and across [m] after dt, slip ratio and tangent of the slip angle.
+
+    A wheel without load has none of them.
+    """
+    speed = absolute(forward_speed)
+    sigma_x, sigma_y = relaxation_lengths(tyre, load, camber)
+    u = relax(state[LONGITUDINAL], -slip_x, speed, sigma_x, dt)
+    v = relax(state[LATERAL], slip_y, speed, sigma_y, dt)
+    kappa, tan_alpha = u / sigma_x, v / sigma_y
+    slow = speed < LOW_SPEED
+    if anywhere(slow):
+        stiffness_x, stiffness_y = slip_stiffnesses(tyre, load, camber)
+        give_x, give_y = load * sigma_x / stiffness_x, load * sigma_y / stiffness_y
+        u_bounded = bounded(u, state[LONGITUDINAL], LARGEST_DEFLECTION * give_x)
+        v_bounded = bounded(v, state[LATERAL], LARGEST_DEFLECTION * give_y)
+        fade = LOW_SPEED_DAMPING_RATIO * (1.0 + cos(math.pi / LOW_SPEED * speed))
+        kappa_damped = (u_bounded - fade * slip_x * sqrt(give_x / GRAVITY)) / sigma_x
+        tan_alpha_damped = (v_bounded + fade * slip_y * sqrt(give_y / GRAVITY)) / sigma_y
+        u, v = where(slow, u_bounded, u), where(slow, v_bounded, v)
+        kappa, tan_alpha = (
+            where(slow, kappa_damped, kappa),
+            where(slow, tan_alpha_damped, tan_alpha),
+        )
+    touches = load > 0.0
+    return (
+        where(touches, u, 0.0),
+        where(touches, v, 0.0),
+        where(touches, kappa, 0.0),
+        where(touches, tan_alpha, 0.0),
+    )

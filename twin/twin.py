@@ -7,16 +7,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin import kernel
-from twin.car import DATA_VIEWS, MODEL_VIEWS, Car
+from twin.car import DATA_VIEWS, MODEL_VIEWS, Car, new_car
 from twin.channels import INPUTS, OUTPUTS, STATES, TYRE_OUTPUTS, WHEELS
 from twin.contact import ROAD
 from twin.errors import TwinError
+from twin.four_tyres import table_of
 from twin.load import PARAMETERS
 from twin.tyre import effective_radius
 from twin.vehicle import SENSORS, Vehicle
 
 Array = NDArray[np.float64]
 SETTLING_STEPS = 20
+LARGEST_HAND_WHEEL = 15.0  # [rad], some two turns and a half; road wheels stay below 60 degrees
 LARGEST_TORQUE = 1e5  # [N m], far beyond what a wheel ever sees
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -49,7 +51,8 @@ class Twin:
         self.vehicle = vehicle
         self.model = vehicle.compile()
         self.data = mujoco.MjData(self.model)
-        self.car = _bind(vehicle, self.model, self.data)
+        self._tyres = vehicle.tyres()
+        self.car = _bind(self.model, self.data, self._tyres)
         self.dt = self.car.dt
         self.reset()
 
@@ -74,38 +77,67 @@ class Twin:
         u = np.zeros(len(INPUTS))
         u[9:] = road
         mujoco.mj_resetData(self.model, self.data)
-        pose = np.zeros(7)
-        pose[0] = self.data.qpos[2] + np.mean(u[9:])
-        spin = np.zeros(4)
+        ahead, normal = self._plane(u[9:])
+        velocity, spin = speed * ahead, np.zeros(4)
+        pose = self._parallel_to(u[9:], ahead, normal)
         rest = [2, 3, 4, *self.car.travel_dof]
 
         def accelerations(pose: Array) -> Array:
-            self._place(pose, speed, spin, u[9:])
+            self._place(pose, velocity, spin, u[9:])
             kernel.step(self.car, u, np.empty(len(OUTPUTS)))
-            return self.data.qacc[rest]
+            rates = self.data.qacc[rest]
+            rates[0] = normal @ self.data.qacc[:3]  # a free car runs down its slope
+            return rates
 
         # Newton's method: scipy's root would keep this twin and its memory alive in a cycle
+        residual = np.inf
         for _ in range(SETTLING_STEPS):
             rates = accelerations(pose)
             residual = np.abs(rates).max()
             if not 1e-9 < residual < np.inf:
                 break
             slopes = [(accelerations(pose + dp) - rates) / 1e-6 for dp in 1e-6 * np.eye(7)]
-            pose -= np.linalg.solve(np.transpose(slopes), rates)
+            try:
+                pose -= np.linalg.solve(np.transpose(slopes), rates)
+            except np.linalg.LinAlgError:  # off the road: the tyres do not answer
+                break
             accelerations(pose)
             loads = self.car.tyre_output[:, 2]  # the rolling radius hangs on them, if weakly
             spin[:] = [
-                speed / effective_radius(t, z) for t, z in zip(self.car.tyres, loads, strict=True)
+                speed / effective_radius(t, z) for t, z in zip(self._tyres, loads, strict=True)
             ]
         if not residual < 1e-3:
             raise TwinError(
                 f"{self.vehicle.source}: the car does not settle on its wheels at {speed} m/s; "
                 f"accelerations of {residual:.3g} m/s2 remain"
             )
-        self._place(pose, speed, spin, u[9:])
+        self._place(pose, velocity, spin, u[9:])
         self.data.time = 0.0
 
-    def _place(self, pose: Array, speed: float, spin: Array, road: Array) -> None:
+    def _plane(self, road: Array) -> tuple[Array, Array]:
+        """Directions ahead in the plane of the road under the wheels, and normal to it."""
+        rise = (road[0] + road[1] - road[2] - road[3]) / (2.0 * self.car.wheelbase)
+        bank = (road[0] - road[1] + road[2] - road[3]) / (2.0 * self.car.track)
+        upright = 1.0 - rise**2 - bank**2
+        if not upright > 0.25:
+            raise TwinError(f"reset: road is {road}; allowed: a plane of at most 60 degrees")
+        ahead = np.array([np.sqrt(1.0 - rise**2), 0.0, rise])
+        return ahead, np.array([-rise, -bank, np.sqrt(upright)])
+
+    def _parallel_to(self, road: Array, ahead: Array, normal: Array) -> Array:
+        """The pose (7,) as drawn in the MJCF, wheels at their height above the road's plane."""
+        pose = np.zeros(7)
+        pose[:3] = self.data.qpos[2], np.arcsin(-normal[1]), -np.arcsin(ahead[2])
+        heights = []
+        for tilt in (0.0, 1.0):
+            self._place(pose * [1.0, tilt, tilt, 0, 0, 0, 0], np.zeros(3), np.zeros(4), road)
+            mujoco.mj_kinematics(self.model, self.data)
+            heights.append(self.data.xpos[self.car.wheel_body, 2].mean())
+        pose[0] += np.mean(road) + heights[0] - heights[1]
+        pose[3:] = np.array([1.0, -1.0, -1.0, 1.0]) * (road @ [0.25, -0.25, -0.25, 0.25])  # warp
+        return pose
+
+    def _place(self, pose: Array, velocity: Array, spin: Array, road: Array) -> None:
         """Puts height, roll, pitch and four travels, rolling straight ahead on relaxed tyres."""
         data, car = self.data, self.car
         data.qpos[:] = 0.0
@@ -113,7 +145,7 @@ class Twin:
         mujoco.mju_euler2Quat(data.qpos[3:7], np.array([pose[2], pose[1], 0.0]), "YXZ")
         data.qpos[car.travel_qpos] = pose[3:]
         data.qvel[:] = 0.0
-        data.qvel[0] = speed
+        data.qvel[:3] = velocity
         data.qvel[car.spin_dof] = spin
         car.tyre_state[:, :ROAD] = 0.0
         car.tyre_state[:, ROAD] = road
@@ -142,7 +174,7 @@ class Twin:
         kernel.correct(self.car, _vector(dx, len(STATES), "correct"))
 
     def set_parameters(self, p: ArrayLike) -> Array:
-        """Sets the (10,) load parameters, see `parameters`, and returns what is physically valid."""
+        """Sets the (10,) load parameters, see `parameters`; returns what is physically valid."""
         p = _vector(p, len(PARAMETERS), "set_parameters").copy()
         kernel.set_parameters(self.car, p)
         return p
@@ -190,8 +222,8 @@ def check_inputs(inputs: Array, what: str) -> None:
     """
     if inputs.ndim != 2 or inputs.shape[1] != len(INPUTS):
         raise TwinError(f"{what}: inputs have shape {inputs.shape}; allowed: (n, {len(INPUTS)})")
-    low = np.array([-50.0] + [-LARGEST_TORQUE] * 4 + [0.0] * 4 + [-1e4] * 4)
-    high = np.array([50.0] + [LARGEST_TORQUE] * 8 + [1e4] * 4)
+    low = np.array([-LARGEST_HAND_WHEEL] + [-LARGEST_TORQUE] * 4 + [0.0] * 4 + [-1e4] * 4)
+    high = np.array([LARGEST_HAND_WHEEL] + [LARGEST_TORQUE] * 8 + [1e4] * 4)
     good = (inputs >= low) & (inputs <= high)
     if not good.all():
         row, column = np.argwhere(~good)[0]
@@ -204,11 +236,14 @@ def check_inputs(inputs: Array, what: str) -> None:
 def _vector(values: ArrayLike, size: int, what: str) -> Array:
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.shape != (size,) or not np.isfinite(array).all():
-        raise TwinError(f"{what}: needs {size} finite numbers, got {array.shape}: {array}")
+        raise TwinError(
+            f"{what}: needs {size} finite numbers, got shape {array.shape} with "
+            f"{np.count_nonzero(~np.isfinite(array))} that are not finite"
+        )
     return array
 
 
-def _bind(vehicle: Vehicle, model: mujoco.MjModel, data: mujoco.MjData) -> Car:
+def _bind(model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void]) -> Car:
     chassis = model.body("chassis").id
     wheels = [model.body(f"wheel_{w}").id for w in WHEELS]
     travels = [model.joint(f"travel_{w}").id for w in WHEELS]
@@ -222,13 +257,13 @@ def _bind(vehicle: Vehicle, model: mujoco.MjModel, data: mujoco.MjData) -> Car:
     mujoco.mju_quat2Mat(axes, model.body_iquat[chassis])
     turn = axes.reshape(3, 3)
     inertia = turn @ np.diag(model.body_inertia[chassis]) @ turn.T
-    tyres = vehicle.tyres()
-    return Car(
+    return new_car(
         model=model._address,
         data=data._address,
-        **{name: getattr(data, name) for name in DATA_VIEWS},
-        **{name: getattr(model, name) for name in MODEL_VIEWS},
+        **{name: getattr(data, name).ctypes.data for name in DATA_VIEWS},
+        **{name: getattr(model, name).ctypes.data for name in MODEL_VIEWS},
         chassis=chassis,
+        wheel=np.arange(len(WHEELS)),
         wheel_body=np.array(wheels),
         travel_joint=np.array(travels),
         travel_qpos=model.jnt_qposadr[travels].astype(np.int64),
@@ -251,10 +286,8 @@ def _bind(vehicle: Vehicle, model: mujoco.MjModel, data: mujoco.MjData) -> Car:
                 *(inertia[0, 1], inertia[0, 2], inertia[1, 2]),
             ]
         ),
+        compiled_inertia=np.append(model.body_inertia[chassis], model.body_iquat[chassis]),
+        other_mass=model.body_subtreemass[[0, chassis]] - model.body_mass[chassis],
         side=np.array([1.0, -1.0, 1.0, -1.0]) * tyres["side"],
-        tyres=tyres,
-        tyre_state=np.zeros((4, 3)),
-        tyre_output=np.zeros((4, len(TYRE_OUTPUTS))),
-        parameters=np.zeros(len(PARAMETERS)),
-        scratch=np.empty(32),
+        tyres=table_of(tyres),
     )

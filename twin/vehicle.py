@@ -15,7 +15,12 @@ from twin.tir import read_tyre
 
 # Numbers of <custom> that every car needs, with the least that is allowed
 NUMBERS = {"steering_ratio": 1e-3, "ackermann": 0.0, "drag_area": 0.0}
-SENSORS = ("acceleration", "rates", *(f"wheel_speed_{w}" for w in WHEELS))
+SENSOR_KINDS = {
+    "acceleration": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+    "rates": mujoco.mjtSensor.mjSENS_GYRO,
+    **{f"wheel_speed_{w}": mujoco.mjtSensor.mjSENS_JOINTVEL for w in WHEELS},
+}
+SENSORS = tuple(SENSOR_KINDS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +57,9 @@ class Vehicle:
             TwinError: the file is missing or broken.
         """
         if not self.source.is_file():
-            raise TwinError(f"{self.source}: no such vehicle file; give an MJCF file or a car's name")
+            raise TwinError(
+                f"{self.source}: no such vehicle file; give an MJCF file or a car's name"
+            )
         try:
             spec = mujoco.MjSpec.from_file(str(self.source))
         except (ValueError, mujoco.FatalError) as error:
@@ -94,6 +101,7 @@ class Vehicle:
                 ("chassis", *(f"{j}_{w}" for w in WHEELS for j in ("travel", "spin"))),
             ),
             "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, SENSORS),
+            "site": (mujoco.mjtObj.mjOBJ_SITE, ("imu",)),
             "numeric": (mujoco.mjtObj.mjOBJ_NUMERIC, tuple(NUMBERS)),
             "text": (mujoco.mjtObj.mjOBJ_TEXT, ("tyre_front", "tyre_rear")),
         }
@@ -101,10 +109,18 @@ class Vehicle:
             for name in names:
                 if mujoco.mj_name2id(model, code, name) < 0:
                     raise TwinError(f"{self.source}: has no {kind} named {name!r}; a car needs one")
+        for name, kind in SENSOR_KINDS.items():
+            if model.sensor(name).type[0] != kind:
+                wanted = kind.name.removeprefix("mjSENS_").lower()
+                raise TwinError(f"{self.source}: sensor {name} must be of the kind {wanted}")
+        if model.site("imu").pos.any():
+            raise TwinError(f"{self.source}: site imu must stand at the origin of the chassis")
+        if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET:
+            raise TwinError(f"{self.source}: option flag autoreset must be disable")
         if (model.nq, model.nv) != (15, 14) or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
             raise TwinError(
-                f"{self.source}: has {model.nv} degrees of freedom; a car has 14: chassis on a free "
-                "joint that comes first, four travels, four spins"
+                f"{self.source}: has {model.nv} degrees of freedom; a car has 14: chassis on a "
+                "free joint that comes first, four travels, four spins"
             )
         if model.opt.integrator not in (
             mujoco.mjtIntegrator.mjINT_EULER,
@@ -114,7 +130,9 @@ class Vehicle:
         for name, least in NUMBERS.items():
             value = model.numeric(name).data[0]
             if not least <= value < np.inf:
-                raise TwinError(f"{self.source}: numeric {name} is {value}; allowed: at least {least}")
+                raise TwinError(
+                    f"{self.source}: numeric {name} is {value}; allowed: at least {least}"
+                )
 
     def tyres(self) -> np.ndarray:
         """Coefficients of the four tyres, (4,) records; .tir files beside the MJCF come first.

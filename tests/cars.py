@@ -1,0 +1,120 @@
+"""Cars for the tests: variants of the SUV written to a folder, and a compiled loop that drives."""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+import models
+from twin import INPUTS, TYRE_OUTPUTS, WHEELS, Twin, Vehicle
+from twin.kernel import read_states, step
+
+G = 9.81
+FL, FR, RL, RR = range(4)
+FX, FY, FZ, MX, MY, MZ, KAPPA, ALPHA, CAMBER = range(len(TYRE_OUTPUTS))
+X, Y, Z, ROLL, PITCH, YAW, TRAVEL = range(7)
+ANGLE, VX, VY, VZ, ROLL_RATE, PITCH_RATE, YAW_RATE, RATE, SPIN = 10, 14, 15, 16, 17, 18, 19, 20, 24
+
+# models/suv.xml, written out: what hand calculations start from
+MASS, CM_Y, UNSPRUNG, WHEEL_INERTIA = 2125.8, -0.00003, 25.0 + 28.0, 1.7
+FRONT, REAR, HALF_TRACK, HUB_Z = 1.25, -1.65, 0.825, -0.2965
+WHEELBASE = FRONT - REAR
+TOTAL = MASS + 4.0 * UNSPRUNG
+PLACES = np.array(
+    [[x, y, HUB_Z] for x in (FRONT, REAR) for y in (HALF_TRACK, -HALF_TRACK)]
+)  # of the wheel centres in the chassis frame
+DRAG_AREA, AIR_DENSITY = 0.90, 1.2
+
+
+class Run(NamedTuple):
+    """What a drive gave, sample by sample; all belongs to the state before the step."""
+
+    inputs: np.ndarray  # (N, 13)
+    outputs: np.ndarray  # (N, 10)
+    states: np.ndarray  # (N, 28)
+    tyres: np.ndarray  # (N, 4, 9)
+
+
+@njit(cache=True, nogil=True)
+def _advance(car, inputs, outputs, states, tyres):
+    for k in range(inputs.shape[0]):
+        read_states(car, states[k])
+        step(car, inputs[k], outputs[k])
+        tyres[k] = car.tyre_output
+
+
+def run(twin, inputs):
+    """Steps the twin through (N, 13) inputs and raises if it blows up."""
+    inputs = np.ascontiguousarray(inputs, dtype=float)
+    n = len(inputs)
+    made = Run(inputs, np.empty((n, 10)), np.empty((n, 28)), np.empty((n, 4, 9)))
+    _advance(twin.car, *made)
+    twin.check()
+    return made
+
+
+def inputs(seconds, dt=0.001, *, steering=0.0, drive=0.0, brake=0.0, road=0.0):
+    """(N, 13) inputs; each argument a number, an array over time, or one per wheel."""
+    u = np.zeros((round(seconds / dt), len(INPUTS)))
+    u[:, 0] = steering
+    u[:, 1:5] = drive
+    u[:, 5:9] = brake
+    u[:, 9:13] = road
+    return u
+
+
+def times(seconds, dt=0.001):
+    return np.arange(round(seconds / dt)) * dt
+
+
+def suv(speed=0.0, **where):
+    """The SUV on its wheels."""
+    twin = Twin(Vehicle.load("suv"))
+    twin.reset(speed, **where)
+    return twin
+
+
+def variant(folder, *edits, tyre=()):
+    """The SUV with strings of its MJCF and numbers of its tyre changed.
+
+    Args:
+        folder: where to write it.
+        edits: (pattern, replacement) regular expressions; each must be found.
+        tyre: pairs (KEY, value) of the .tir file.
+    """
+    xml = models.path("suv").read_text()
+    for pattern, replacement in edits:
+        xml, found = re.subn(pattern, replacement, xml)
+        assert found, pattern
+    tir = models.path("tyres/suv.tir").read_text()
+    for key, value in dict(tyre).items():
+        tir, found = re.subn(rf"(?m)^{key}(\s*)=\s*\S+", rf"{key}\1= {value!r}", tir)
+        assert found == 1, key
+    (folder / "tyres").mkdir(exist_ok=True)
+    (folder / "tyres/suv.tir").write_text(tir)
+    (folder / "car.xml").write_text(xml)
+    return Vehicle.load(folder / "car.xml")
+
+
+def vertical_slides():
+    """The edits that make the wheels travel along the body's z axis."""
+    return ((r'(name="travel_\w\w" class="\w+" axis=)"[^"]*"', r'\1"0 0 1"'),)
+
+
+def contact_points(twin, road=0.0):
+    """(4, 3) of the wheels on level ground as MuJoCo has them now: in each wheel's plane."""
+    points = np.empty((4, 3))
+    for w, wheel in enumerate(WHEELS):
+        body = twin.data.body(f"wheel_{wheel}")
+        axis = body.xmat.reshape(3, 3)[:, 1]
+        ahead = np.cross(axis, [0.0, 0.0, 1.0])
+        upright = np.cross(ahead / np.linalg.norm(ahead), axis)
+        height = body.xpos[2] - np.broadcast_to(road, 4)[w]
+        points[w] = body.xpos - height / upright[2] * upright
+    return points
+
+
+def drag(speed):
+    """Air drag [N] along the body, by hand."""
+    return -0.5 * AIR_DENSITY * DRAG_AREA * speed * abs(speed)
