@@ -15,6 +15,16 @@ mass, and a correction has the form
   signal itself with the gains of a recursive least-squares fit with forgetting: the Kalman filter
   of e = (a~ / scale) missing + offset + noise. The offset, a bias of the sensor or gravity seen by
   a car that stands otherwise than its twin, is fitted along: it does not pull the parameter.
+
+Two more make a regressor of a better signal:
+
+* a *mode*. The twin runs free: with a wrong roll inertia it also rolls to another angle, and its
+  springs then pull it back. Below the frequency of the roll mode that undoes what the inertia did:
+  the difference of the accelerations is not a~ times the missing share, but
+  s^2 / (s^2 + 2 zeta w s + w^2) of it. The same filter on the instrument turns it into that.
+* a *lag*. Where the twin itself is driven by a noisy input, a road known with an error, its signal
+  is no clean instrument either. The measured signal of a while ago is independent of both noises of
+  now. A negative scale says that a mode has turned it over in the meantime.
 """
 
 import math
@@ -30,17 +40,24 @@ from twin import OUTPUTS, PARAMETERS, TwinError
 
 Array = NDArray[np.float64]
 
-# Signals that a law can use: what the sensors give, and the angular accelerations [rad/s2]. These
-# come from the rates by the same causal filter for vehicle and twin, s / (filter_time s + 1)^2: it
+# Signals that a law can use: what the sensors give, and accelerations [m/s2, rad/s2]. These come
+# from a measured rate by the same causal filter for vehicle and twin, s / (filter_time s + 1)^2: it
 # differentiates below its corner, and delays both by two filter times, so that the delay cancels.
-ACCELERATIONS = ("roll_acceleration", "pitch_acceleration", "yaw_acceleration")
-SIGNALS = OUTPUTS + ACCELERATIONS
+ACCELERATIONS = {
+    "heave_acceleration": "vz",
+    "roll_acceleration": "roll_rate",
+    "pitch_acceleration": "pitch_rate",
+    "yaw_acceleration": "yaw_rate",
+}
+SIGNALS = (*OUTPUTS, *ACCELERATIONS)
+_WHEEL_SPEEDS = OUTPUTS[6:]
 
 # Columns of a law's memory: covariance of parameter and offset, and the offset itself
 PP, PO, OO, OFFSET = range(4)
 # and of the differentiating filter: whether it has begun, its two stages for vehicle and for twin
 BEGUN, FILTER = 4, 5
-MEMORY = 9
+# of the mode's filter, position and speed; and the place in the ring of lagged instruments
+MODE, PLACE, RING = 9, 11, 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,19 +65,22 @@ class ParameterLaw:
     """How one signal corrects one load parameter.
 
     Attributes:
-        parameter: of `twin.PARAMETERS`.
-        signal: of `SIGNALS`.
+        parameter: of `twin.PARAMETERS`; the black box at hand must have it.
+        signal: of `SIGNALS`; the black box at hand must have what it comes from.
         instrument: whose signal the regressor is made of.
         form: "sign" or "least-squares", see the module.
         gain: of the sign form, unit of the parameter per second and unit of the signal.
         scale: of the least-squares form, the nominal value of the parameter: what divides the
-            force or moment in the twin.
+            force or moment in the twin. Negative for an instrument in antiphase.
+        mode_frequency: of the free twin [Hz], which the regressor is filtered by; zero: none.
+        mode_damping: damping ratio of that mode.
+        lag: of the instrument [s].
         prior_sd: of the least-squares form, of the parameter before the first sample.
         noise_density: of the least-squares form, of the signal's noise [unit of the signal over
             the root of Hz]: standard deviation times the root of the sample time.
         drift: of the least-squares form, of the parameter [unit over the root of s]: forgetting.
         offset_sd: of the least-squares form, of the signal's offset; zero: there is none.
-        filter_time: of the differentiating filter [s]; only angular accelerations have one.
+        filter_time: of the differentiating filter [s]; only `ACCELERATIONS` have one.
         least_wheel_speed: the law rests while vehicle or twin is slower [rad/s]: a car held by its
             brakes tells nothing of its mass.
     """
@@ -76,6 +96,9 @@ class ParameterLaw:
     drift: float = 0.0
     offset_sd: float = 0.0
     filter_time: float = 0.02
+    mode_frequency: float = 0.0
+    mode_damping: float = 0.5
+    lag: float = 0.0
     least_wheel_speed: float = 0.0
 
     def __post_init__(self) -> None:
@@ -88,12 +111,22 @@ class ParameterLaw:
         ):
             if name not in allowed:
                 raise TwinError(f"law: {kind} is {name!r}; allowed: {', '.join(allowed)}")
-        for name in ("gain", "drift", "offset_sd", "least_wheel_speed"):
+        if self.scale == 0.0 or not math.isfinite(self.scale):
+            raise TwinError(f"law: scale is {self.scale}; allowed: any number but 0")
+        for name in (
+            *("gain", "drift", "offset_sd", "least_wheel_speed"),
+            *("mode_frequency", "mode_damping", "lag"),
+        ):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: 0 or more")
-        for name in ("scale", "prior_sd", "noise_density", "filter_time"):
+        for name in ("prior_sd", "noise_density", "filter_time"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
+
+    @property
+    def output(self) -> str:
+        """The measurement that the signal is, or comes from."""
+        return ACCELERATIONS.get(self.signal, self.signal)
 
 
 class Laws(NamedTuple):
@@ -109,19 +142,34 @@ class Laws(NamedTuple):
     intensity: Array  # noise_density squared
     drift: Array
     filter_time: Array
+    mode_frequency: Array  # [rad/s]
+    mode_damping: Array
+    lag: NDArray[np.int64]  # samples
     least_wheel_speed: Array
 
 
-def _output(signal: str) -> int:
-    """The column of the sensor that a signal comes from."""
-    return OUTPUTS.index(signal.replace("acceleration", "rate"))
+def compile_laws(
+    laws: Sequence[ParameterLaw],
+    dt: float,
+    outputs: tuple[str, ...] = OUTPUTS,
+    parameters: tuple[str, ...] = PARAMETERS,
+) -> tuple[Laws, Array]:
+    """The laws as arrays, and the memory, a row each, that they start with.
 
+    Args:
+        laws: what corrects which parameter.
+        dt: sample time [s].
+        outputs: of the black box at hand.
+        parameters: of the black box at hand.
 
-def compile_laws(laws: Sequence[ParameterLaw]) -> tuple[Laws, Array]:
-    """The laws as arrays, and the memory (n, MEMORY) that they start with."""
+    Raises:
+        TwinError: a law needs what the black box does not have.
+    """
+    for law in laws:
+        _check_names(law, outputs, parameters)
     table = Laws(
-        np.array([PARAMETERS.index(law.parameter) for law in laws], dtype=np.int64),
-        np.array([_output(law.signal) for law in laws], dtype=np.int64),
+        np.array([parameters.index(law.parameter) for law in laws], dtype=np.int64),
+        np.array([outputs.index(law.output) for law in laws], dtype=np.int64),
         np.array([law.signal in ACCELERATIONS for law in laws], dtype=np.bool_),
         np.array([law.instrument == "measured" for law in laws], dtype=np.bool_),
         np.array([law.form == "sign" for law in laws], dtype=np.bool_),
@@ -130,12 +178,30 @@ def compile_laws(laws: Sequence[ParameterLaw]) -> tuple[Laws, Array]:
         np.array([law.noise_density**2 for law in laws], dtype=np.float64),
         np.array([law.drift for law in laws], dtype=np.float64),
         np.array([law.filter_time for law in laws], dtype=np.float64),
+        np.array([2.0 * math.pi * law.mode_frequency for law in laws], dtype=np.float64),
+        np.array([law.mode_damping for law in laws], dtype=np.float64),
+        np.array([round(law.lag / dt) for law in laws], dtype=np.int64),
         np.array([law.least_wheel_speed for law in laws], dtype=np.float64),
     )
-    memory = np.zeros((len(laws), MEMORY))
+    memory = np.zeros((len(laws), RING + max((round(law.lag / dt) for law in laws), default=0)))
     memory[:, PP] = [law.prior_sd**2 for law in laws]
     memory[:, OO] = [law.offset_sd**2 for law in laws]
     return table, memory
+
+
+def _check_names(law: ParameterLaw, outputs: tuple[str, ...], parameters: tuple[str, ...]) -> None:
+    signals = (*outputs, *(a for a, rate in ACCELERATIONS.items() if rate in outputs))
+    for kind, name, allowed in (
+        ("parameter", law.parameter, parameters),
+        ("signal", law.signal, signals),
+    ):
+        if name not in allowed:
+            raise TwinError(f"law: {kind} is {name!r}; this black box allows: {', '.join(allowed)}")
+    if law.least_wheel_speed > 0.0 and outputs[6:] != _WHEEL_SPEEDS:
+        raise TwinError(
+            f"law: least_wheel_speed is {law.least_wheel_speed}; this black box, without wheel "
+            "speeds, allows: 0"
+        )
 
 
 @njit(cache=True)
@@ -151,9 +217,9 @@ def advance_law(laws, k, memory, y, twin_y, dt):
     Args:
         laws: all laws.
         k: the law's row.
-        memory: (MEMORY,) of this law.
-        y: (10,) measurements.
-        twin_y: (10,) outputs of the twin.
+        memory: of this law.
+        y: (ny,) measurements.
+        twin_y: (ny,) outputs of the twin.
         dt: sample time [s].
     """
     a, a_twin = y[laws.output[k]], twin_y[laws.output[k]]
@@ -165,10 +231,10 @@ def advance_law(laws, k, memory, y, twin_y, dt):
         decay = dt / (laws.filter_time[k] + dt)
         a = _differentiate(memory[FILTER : FILTER + 2], a, decay, dt)
         a_twin = _differentiate(memory[FILTER + 2 : FILTER + 4], a_twin, decay, dt)
+    instrument = _regressor(laws, k, memory, a if laws.measured[k] else a_twin, dt)
     least = laws.least_wheel_speed[k]
     if least > 0.0 and not (_moving(y, least) and _moving(twin_y, least)):
         return 0.0
-    instrument = a if laws.measured[k] else a_twin
     if laws.sign[k]:
         return laws.gain[k] * dt * np.sign(instrument) * (a_twin - a)
     return _fit(
@@ -178,6 +244,22 @@ def advance_law(laws, k, memory, y, twin_y, dt):
         laws.intensity[k] / dt,
         laws.drift[k] ** 2 * dt,
     )
+
+
+@njit(cache=True)
+def _regressor(laws, k, memory, signal, dt):
+    """One sample of the instrument, filtered by the mode and lagged."""
+    if laws.mode_frequency[k] > 0.0:
+        w = laws.mode_frequency[k]
+        position, speed = memory[MODE], memory[MODE + 1]
+        signal -= 2.0 * laws.mode_damping[k] * w * speed + w * w * position
+        memory[MODE + 1] = speed + signal * dt
+        memory[MODE] = position + memory[MODE + 1] * dt
+    if laws.lag[k] > 0:
+        place = RING + int(memory[PLACE])
+        signal, memory[place] = memory[place], signal
+        memory[PLACE] = (memory[PLACE] + 1.0) % laws.lag[k]
+    return signal
 
 
 @njit(cache=True)

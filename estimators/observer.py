@@ -5,8 +5,9 @@ and the twin's outputs then corrects the twin's states by a linear law, TiL Eq. 
 parameters by nonlinear laws, TiL Eq. (5), one per parameter (`estimators.law`). Gains are
 continuous, per second: they mean the same at any sample rate.
 
-One compiled function, `_update`, is the observer. `Observer.update` calls it for one sample,
-`Observer.run` for a whole drive.
+One compiled function, `_update`, is the observer of a `twin.Twin`: `Observer.update` calls it for
+one sample, `Observer.run` for a whole drive. Any other black box is stepped from Python, between
+the same two compiled laws, `_state_law` and `_parameter_laws`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,16 +17,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from estimators.black_box import BlackBox, NamedEstimate
 from estimators.estimate import Estimate
 from estimators.law import ParameterLaw, advance_law, compile_laws
-from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, Drive, Twin, TwinError, check_inputs
+from twin import Drive, Twin, TwinError, check_inputs
 from twin.kernel import correct, is_sound, read_states, set_parameters, step
 
 Array = NDArray[np.float64]
 
 
 class Gains(NamedTuple):
-    """The linear law K (28 x 10), TiL Eq. (4), by its entries that are not zero."""
+    """The linear law K (nx, ny), TiL Eq. (4), by its entries that are not zero."""
 
     state: NDArray[np.int64]
     output: NDArray[np.int64]
@@ -35,10 +37,10 @@ class Gains(NamedTuple):
 class Memory(NamedTuple):
     """What an observer keeps from sample to sample, beside its twin."""
 
-    u: Array  # (13,) the inputs of the sample
-    y: Array  # (10,) the twin's outputs before the last correction
-    dx: Array  # (28,) the last correction of the states
-    p: Array  # (10,) the parameters in force
+    u: Array  # (nu,) the inputs of the sample
+    y: Array  # (ny,) the twin's outputs before the last correction
+    dx: Array  # (nx,) the last correction of the states
+    p: Array  # (np,) the parameters in force
     laws: Array  # (n, m) memory of each parameter law
 
 
@@ -46,7 +48,8 @@ class Observer:
     """A Twin-in-the-Loop observer.
 
     Args:
-        twin: the black box; the observer owns it from now on.
+        twin: the black box; the observer owns it from now on. For a `twin.Twin` all of a sample is
+            compiled code, for any other the simulator's step is called from Python.
         laws: what corrects which load parameter.
         gains: entries of K by (state, output), for example
             `{("yaw_rate", "yaw_rate"): 5.0}` [1/s].
@@ -57,15 +60,19 @@ class Observer:
 
     def __init__(
         self,
-        twin: Twin,
+        twin: BlackBox,
         laws: Sequence[ParameterLaw],
         gains: Mapping[tuple[str, str], float] | None = None,
     ) -> None:
         self.twin = twin
-        self._gains = _compile_gains(gains or {})
-        self._laws, memory = compile_laws(laws)
+        self._gains = _compile_gains(gains or {}, twin)
+        self._laws, memory = compile_laws(laws, twin.dt, twin.outputs, twin.parameters)
         self._memory = Memory(
-            *(np.zeros(len(names)) for names in (INPUTS, OUTPUTS, STATES, PARAMETERS)), memory
+            u=np.zeros(len(twin.inputs)),
+            y=np.zeros(len(twin.outputs)),
+            dx=np.zeros(len(twin.states)),
+            p=np.zeros(len(twin.parameters)),
+            laws=memory,
         )
         self._fresh = memory.copy()
 
@@ -76,25 +83,28 @@ class Observer:
             speed: [m/s].
             parameters: deltas from the nominal chassis by name; zero where not given.
         """
-        p = np.zeros(len(PARAMETERS))
+        p = np.zeros(len(self.twin.parameters))
         for name, value in (parameters or {}).items():
-            p[_index(name, PARAMETERS, "parameter")] = value
+            p[_index(name, self.twin.parameters, "parameter")] = value
         self._memory.laws[:] = self._fresh
         self._memory.p[:] = self.twin.set_parameters(p)
         self.twin.reset(speed)
 
     def update(self, u: ArrayLike, y: ArrayLike) -> Array:
-        """Takes one sample of inputs (13,) and measurements (10,); returns the parameters (10,).
+        """Takes one sample of inputs (nu,) and measurements (ny,); returns the parameters (np,).
 
         Raises:
             TwinError: a value is not finite or out of range, or the twin has blown up.
         """
         self._memory.u[:] = u
         y = np.ascontiguousarray(y, dtype=np.float64)
-        check_inputs(self._memory.u[None], "update")
-        _check_measurements(y[None], "update")
-        _update(self.twin.car, self._gains, self._laws, self._memory, y)
-        self.twin.check()
+        _check_measurements(y[None], self.twin.outputs, "update")
+        if isinstance(self.twin, Twin):
+            check_inputs(self._memory.u[None], "update")
+            _update(self.twin.car, self._gains, self._laws, self._memory, y)
+            self.twin.check()
+        else:
+            self._update_black_box(y)
         return self._memory.p.copy()
 
     def run(self, drive: Drive) -> Estimate:
@@ -113,14 +123,17 @@ class Observer:
             raise TwinError(
                 f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s"
             )
+        _check_measurements(drive.measurements, self.twin.outputs, "drive")
+        if isinstance(self.twin, Twin):
+            return self._run_compiled(self.twin, drive)
+        return self._run_black_box(drive)
+
+    def _run_compiled(self, twin: Twin, drive: Drive) -> Estimate:
         check_inputs(drive.inputs, "drive")
-        _check_measurements(drive.measurements, "drive")
         n = len(drive)
-        states, parameters, outputs = (
-            np.empty((n, len(names))) for names in (STATES, PARAMETERS, OUTPUTS)
-        )
+        states, parameters, outputs = _histories(twin, n)
         done = _run(
-            self.twin.car, self._gains, self._laws, self._memory,
+            twin.car, self._gains, self._laws, self._memory,
             drive.inputs, drive.measurements, states, parameters, outputs,
         )  # fmt: skip
         if done < n:
@@ -133,8 +146,38 @@ class Observer:
             states=states,
             parameters=parameters,
             outputs=outputs,
-            nominal=self.twin.car.nominal.copy(),
+            nominal=twin.car.nominal.copy(),
         )
+
+    def _run_black_box(self, drive: Drive) -> NamedEstimate:
+        twin = self.twin
+        states, parameters, outputs = _histories(twin, len(drive))
+        for k in range(len(drive)):
+            states[k] = twin.read_states()
+            self._memory.u[:] = drive.inputs[k]
+            self._update_black_box(drive.measurements[k])
+            parameters[k] = self._memory.p
+            outputs[k] = self._memory.y
+        return NamedEstimate(
+            time=drive.time,
+            states=states,
+            parameters=parameters,
+            outputs=outputs,
+            nominal=np.full(len(twin.parameters), np.nan),
+            state_names=twin.states,
+            parameter_names=twin.parameters,
+            output_names=twin.outputs,
+        )
+
+    def _update_black_box(self, y: Array) -> None:
+        """`_update`, its simulator called from Python."""
+        twin, memory = self.twin, self._memory
+        memory.y[:] = twin.step(memory.u)
+        if self._gains.gain.size:
+            _state_law(self._gains, memory, y, twin.dt)
+            twin.correct(memory.dx)
+        _parameter_laws(self._laws, memory, y, twin.dt)
+        memory.p[:] = twin.set_parameters(memory.p)
 
 
 @njit(cache=True, nogil=True)
@@ -142,14 +185,26 @@ def _update(car, gains, laws, memory, y):
     """One sample of the observer, its inputs in memory.u."""
     step(car, memory.u, memory.y)
     if gains.gain.size:
-        memory.dx[:] = 0.0
-        for k in range(gains.gain.size):
-            j = gains.output[k]
-            memory.dx[gains.state[k]] += gains.gain[k] * car.dt * (y[j] - memory.y[j])
+        _state_law(gains, memory, y, car.dt)
         correct(car, memory.dx)
-    for k in range(laws.parameter.size):
-        memory.p[laws.parameter[k]] += advance_law(laws, k, memory.laws[k], y, memory.y, car.dt)
+    _parameter_laws(laws, memory, y, car.dt)
     set_parameters(car, memory.p)
+
+
+@njit(cache=True, nogil=True)
+def _state_law(gains, memory, y, dt):
+    """Fills memory.dx with the correction of the states: TiL Eq. (4)."""
+    memory.dx[:] = 0.0
+    for k in range(gains.gain.size):
+        j = gains.output[k]
+        memory.dx[gains.state[k]] += gains.gain[k] * dt * (y[j] - memory.y[j])
+
+
+@njit(cache=True, nogil=True)
+def _parameter_laws(laws, memory, y, dt):
+    """Corrects memory.p: TiL Eq. (5)."""
+    for k in range(laws.parameter.size):
+        memory.p[laws.parameter[k]] += advance_law(laws, k, memory.laws[k], y, memory.y, dt)
 
 
 @njit(cache=True, nogil=True)
@@ -166,11 +221,19 @@ def _run(car, gains, laws, memory, inputs, measurements, states, parameters, out
     return inputs.shape[0]
 
 
-def _compile_gains(gains: Mapping[tuple[str, str], float]) -> Gains:
+def _histories(twin: BlackBox, n: int) -> tuple[Array, Array, Array]:
+    """States, parameters and outputs of n samples, to be filled."""
+    states, parameters, outputs = (
+        np.empty((n, len(names))) for names in (twin.states, twin.parameters, twin.outputs)
+    )
+    return states, parameters, outputs
+
+
+def _compile_gains(gains: Mapping[tuple[str, str], float], twin: BlackBox) -> Gains:
     state, output = [], []
     for (to, of), gain in gains.items():
-        state.append(_index(to, STATES, "state"))
-        output.append(_index(of, OUTPUTS, "output"))
+        state.append(_index(to, twin.states, "state"))
+        output.append(_index(of, twin.outputs, "output"))
         if not np.isfinite(gain):
             raise TwinError(f"gain {of} -> {to} is {gain}; allowed: finite numbers")
     return Gains(
@@ -186,12 +249,11 @@ def _index(name: str, names: tuple[str, ...], kind: str) -> int:
     return names.index(name)
 
 
-def _check_measurements(y: Array, what: str) -> None:
-    if y.shape[1:] != (len(OUTPUTS),):
-        raise TwinError(f"{what}: measurements have shape {y.shape}; allowed: (n, {len(OUTPUTS)})")
+def _check_measurements(y: Array, names: tuple[str, ...], what: str) -> None:
+    if y.shape[1:] != (len(names),):
+        raise TwinError(f"{what}: measurements have shape {y.shape}; allowed: (n, {len(names)})")
     if not np.isfinite(y).all():
         row, column = np.argwhere(~np.isfinite(y))[0]
         raise TwinError(
-            f"{what}: {OUTPUTS[column]} is {y[row, column]} in sample {row}; "
-            "allowed: finite numbers"
+            f"{what}: {names[column]} is {y[row, column]} in sample {row}; allowed: finite numbers"
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from estimators.observer import Observer
 from scenarios.manoeuvres import urban
-from scenarios.mass import LAWS
+from scenarios.mass import STUDY
 from scenarios.progress import progress
 from scenarios.record import record
 from scenarios.result import Result, Row
@@ -55,7 +55,7 @@ def _part(drive: Drive, start: float, duration: float) -> Drive:
 
 
 def _observer() -> Observer:
-    return Observer(Twin(Vehicle.load("suv")), [LAWS["til"]])
+    return Observer(Twin(Vehicle.load("suv")), STUDY.laws["til"])
 
 
 def _seconds(task: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from scenarios.result import Result
 
@@ -19,7 +20,8 @@ class Settings:
     """How a scenario is run.
 
     Attributes:
-        snr: signal-to-noise ratio of the sensors [dB]; inf: no noise.
+        snr: signal-to-noise ratio of the sensors [dB]; inf: no noise; NaN: the scenario's noise is
+            no matter of a ratio.
         seeds: one run each.
         jobs: processes side by side.
         duration: of the drive [s]; None: all of it.
@@ -31,6 +33,12 @@ class Settings:
     duration: float | None
 
 
+def _without_limits(*_: object) -> NoReturn:
+    from twin.errors import TwinError  # not at the top: it imports NumPy
+
+    raise TwinError("limits: this scenario has none; allowed: one of a car with a constant load")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """What a scenario's module offers as `SCENARIO`.
@@ -39,18 +47,18 @@ class Scenario:
         run: drives over all seeds and scores.
         timeline: writes the drive of the first seed as a Rerun recording to the given path,
             whole or not at all.
-        default_snr: signal-to-noise ratio unless the user names one [dB].
         vehicle: the twin's, by its name in `models`.
-        drive: of the real vehicle, without noise.
-        variation: by parameter what its load changes, around the twin's vehicle.
+        default_snr: signal-to-noise ratio unless the user names one [dB]; NaN: it takes none.
+        drive: of the real vehicle, without noise; by default `til limits` says it has none.
+        variation: by parameter what its load changes, around the twin's vehicle; as `drive`.
     """
 
     run: Callable[[Settings], Result]
     timeline: Callable[[Settings, Path], None]
-    default_snr: float
     vehicle: str
-    drive: Callable[[Settings], Drive]
-    variation: Callable[[], Mapping[str, float]]
+    default_snr: float = math.nan
+    drive: Callable[[Settings], Drive] = _without_limits
+    variation: Callable[[], Mapping[str, float]] = _without_limits
 
 
 Reproduction = Callable[[int, int, Path], Result]
@@ -70,23 +78,43 @@ class Entry:
     summary: str
 
 
+_TRUCK = "scenarios.truck"
 SCENARIOS = {
     "mass": Entry(
         "scenarios.mass:SCENARIO", "a car in town finds the mass of the unknown 355 kg on board"
     ),
+    "roll-yaw": Entry(
+        "scenarios.roll_yaw:SCENARIO", "a swept steer tells the roll and yaw inertia"
+    ),
+    "pitch": Entry("scenarios.pitch:SCENARIO", "a rough road tells the pitch inertia"),
+    "truck": Entry(
+        f"{_TRUCK}:SCENARIO", "a truck's load changes twice: Kalman-Bucy filters beside TiL"
+    ),
 }
 
+_TABLES, _FIGURES = "scenarios.til_tables", "scenarios.til_figures"
 REPRODUCTIONS = {
-    "til-table-3": Entry(
-        "scenarios.til_mass:table_3", "load parameters of the empty and loaded car"
+    "til-table-3": Entry(f"{_TABLES}:table_3", "load parameters of the empty and loaded car"),
+    "til-table-4": Entry(f"{_TABLES}:table_4", "mass: noise, wrong CM"),
+    "til-table-5": Entry(f"{_TABLES}:table_5", "roll and yaw inertia: noise, wrong mass, wrong CM"),
+    "til-table-6": Entry(
+        f"{_TABLES}:table_6", "pitch inertia: noise, noisy road, wrong mass, wrong CM"
     ),
-    "til-table-4": Entry(
-        "scenarios.til_mass:table_4", "mass error without noise, with it, wrong CM"
+    "til-figure-4": Entry(f"{_FIGURES}:figure_4", "mass over time from several initial errors"),
+    "til-figure-5": Entry(f"{_FIGURES}:figure_5", "mass error over the sensors' noise"),
+    "til-figure-6": Entry(
+        f"{_FIGURES}:figure_6", "roll and yaw inertia over time, CM right and wrong"
     ),
-    "til-figure-4": Entry(
-        "scenarios.til_mass:figure_4", "mass over time from several initial errors"
-    ),
-    "til-figure-5": Entry("scenarios.til_mass:figure_5", "mass error over the sensors' noise"),
+    "til-figure-7": Entry(f"{_FIGURES}:figure_7", "roll inertia error over noise"),
+    "til-figure-8": Entry(f"{_FIGURES}:figure_8", "yaw inertia error over noise"),
+    "til-figure-9": Entry(f"{_FIGURES}:figure_9", "pitch inertia over time"),
+    "til-figure-10": Entry(f"{_FIGURES}:figure_10", "pitch inertia error over noise"),
+    "til-figure-11": Entry(f"{_FIGURES}:figure_11", "pitch inertia error over the road's noise"),
+    "kbf-table-2": Entry(f"{_TRUCK}_studies:table_2", "every filter in both readings of the noise"),
+    "kbf-figure-5": Entry(f"{_TRUCK}_figures:figure_5", "the truck's velocities over time"),
+    "kbf-figure-6": Entry(f"{_TRUCK}_figures:figure_6", "the truck's mass and inertia over time"),
+    "kbf-tuning": Entry(f"{_TRUCK}_studies:tuning", "R and Q by decades: lower R is not better"),
+    "kbf-robustness": Entry(f"{_TRUCK}_studies:robustness", "filters that know the truck badly"),
 }
 
 

@@ -48,7 +48,7 @@ def run(name: str, scenario: Scenario, settings: Settings) -> tuple[Result, str]
     sd = noise_sd(drive.measurements, settings.snr, drive.output_names)
     sensitivity = np.concatenate(
         [
-            sensitivity_at_truth(scenario, drive, [parameter])
+            sensitivity_at_truth(scenario.vehicle, drive, [parameter], variation)
             for parameter in progress(UNITS, "sensitivities", len(UNITS))
         ]
     )
@@ -82,11 +82,13 @@ def run(name: str, scenario: Scenario, settings: Settings) -> tuple[Result, str]
     )
 
 
-def sensitivity_at_truth(scenario: Scenario, drive: Drive, parameters: Sequence[str]) -> Array:
+def sensitivity_at_truth(
+    vehicle: str, drive: Drive, parameters: Sequence[str], variation: Mapping[str, float]
+) -> Array:
     """(p, N, 10) what parameters change in the outputs, around the real vehicle's load."""
-    twin = Twin(Vehicle.load(scenario.vehicle))
+    twin = Twin(Vehicle.load(vehicle))
     speed = float(drive.truth["vx"][0])
-    return sensitivities(twin, drive, parameters, scenario.variation(), speed=speed)
+    return sensitivities(twin, drive, parameters, variation, speed=speed)
 
 
 def using(sd: Array, channels: Sequence[str]) -> Array:
@@ -115,7 +117,7 @@ def law_limit(law: ParameterLaw, sensitivity: Array, drive: Drive, sd: Array) ->
     bound = limits(
         [law.parameter],
         sensitivity[:, is_moving(drive, law.least_wheel_speed)],
-        using(sd, [law.signal]),
+        using(sd, [law.output]),
         free_offsets=law.offset_sd > 0.0,
     )
     return float(bound.single[0])

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.record import Manoeuvre
+from twin.road import random_walk_heights
 
 Array = NDArray[np.float64]
 
@@ -42,3 +43,66 @@ def urban(dt: float = 0.001, duration: float | None = None) -> Manoeuvre:
             before = after
         start += seconds
     return Manoeuvre(name="urban", dt=dt, speed=speed, steering=np.zeros(n), road=np.zeros((n, 4)))
+
+
+def swept_steer(
+    dt: float = 0.001,
+    duration: float | None = None,
+    *,
+    speed: float = 25.0,
+    amplitude: float = 0.5,
+    highest: float = 4.0,
+    sweep: float = 20.0,
+) -> Manoeuvre:
+    """Sweeps of the hand wheel from 0 to 4 Hz at constant speed (TiL Section 4.3).
+
+    The paper gives neither speed nor amplitude; chosen: some 0.5 g at the lower frequencies.
+
+    Args:
+        dt: sample time [s].
+        duration: [s]; two sweeps if None.
+        speed: [m/s].
+        amplitude: of the hand wheel [rad].
+        highest: frequency [Hz].
+        sweep: length of one [s].
+    """
+    n = round((duration or 2.0 * sweep) / dt)
+    time = np.arange(n) * dt % sweep
+    return Manoeuvre(
+        name="swept steer",
+        dt=dt,
+        speed=np.full(n, speed),
+        steering=amplitude * np.sin(np.pi * highest * time**2 / sweep),
+        road=np.zeros((n, 4)),
+    )
+
+
+def random_road(
+    dt: float = 0.001,
+    duration: float | None = None,
+    *,
+    speed: float = 20.0,
+    wheelbase: float = 2.9,
+    seed: int = 0,
+) -> Manoeuvre:
+    """Straight on at constant speed over the random walk of TiL Eq. (16).
+
+    The paper gives neither speed nor length; chosen: 20 m/s, one minute.
+
+    Args:
+        dt: sample time [s].
+        duration: [s]; a minute if None.
+        speed: [m/s].
+        wheelbase: which the rear wheels follow behind [m].
+        seed: of the road, the same for all laws and noises.
+    """
+    n = round((duration or 60.0) / dt)
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0.0, n * dt, n, endpoint=False)
+    return Manoeuvre(
+        name="random road",
+        dt=dt,
+        speed=np.full(n, speed),
+        steering=np.zeros(n),
+        road=random_walk_heights(rng, time, delay=wheelbase / speed),
+    )

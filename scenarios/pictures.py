@@ -13,13 +13,14 @@ from twin import TwinError
 
 
 @contextmanager
-def figure(path: Path, *, title: str, rows: int = 1) -> Iterator[Any]:
+def figure(path: Path, *, title: str, rows: int = 1, shared: bool = True) -> Iterator[Any]:
     """Axes to draw on, one above the other; saved as PNG when the block ends well.
 
     Args:
         path: of the picture.
         title: above it.
-        rows: how many axes, sharing the horizontal one.
+        rows: how many axes.
+        shared: whether they share the horizontal one.
 
     Raises:
         TwinError: matplotlib is not installed.
@@ -32,7 +33,7 @@ def figure(path: Path, *, title: str, rows: int = 1) -> Iterator[Any]:
         ) from None
     sheet = Figure(figsize=(8.0, 2.0 + 2.5 * rows), dpi=120, layout="constrained")
     sheet.suptitle(title)
-    axes = sheet.subplots(rows, 1, sharex=True)
+    axes = sheet.subplots(rows, 1, sharex=shared)
     for one in np.atleast_1d(axes):
         one.grid(alpha=0.3)
     yield axes

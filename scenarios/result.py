@@ -9,7 +9,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 PACKAGES = ("mujoco", "numpy", "numba", "twin-in-the-loop")
 OPTIONAL_COLUMNS = ("paper", "limit")
@@ -46,7 +49,7 @@ class Row:
     @classmethod
     def over_seeds(
         cls,
-        values: Sequence[float],
+        values: "ArrayLike",
         *,
         case: str,
         quantity: str,
@@ -59,10 +62,11 @@ class Row:
         """The row of values, shape (seeds,) [unit]; a NaN among them makes the figures NaN."""
         import numpy as np  # not at the top: `til list` is quicker without
 
-        if np.ndim(values) != 1 or np.size(values) == 0:
-            raise ValueError(f"values must have shape (seeds,), not {np.shape(values)}")
-        with np.errstate(invalid="ignore"):  # between two infinities
-            p90 = float(np.quantile(values, 0.9))
+        values = np.asarray(values, dtype=np.float64)
+        if values.ndim != 1 or values.size == 0:
+            raise ValueError(f"values must have shape (seeds,), not {values.shape}")
+        # between two infinities there is nothing to interpolate
+        p90 = np.quantile(values, 0.9, method="higher" if np.isinf(values).any() else "linear")
         return cls(
             case=case,
             quantity=quantity,
@@ -71,7 +75,7 @@ class Row:
             estimator=estimator,
             seeds=len(values),
             median=float(np.median(values)),
-            p90=p90,
+            p90=float(p90),
             paper=paper,
             limit=limit,
         )

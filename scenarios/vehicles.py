@@ -1,5 +1,7 @@
 """The real vehicles: what the twin does not know of."""
 
+import numpy as np
+
 import models
 from twin import PointMass
 
@@ -7,7 +9,7 @@ from twin import PointMass
 # Table 3 (its inertias would need a negative sum of m r^2). Chosen: seats and boot of an SUV this
 # size, from the chassis frame, 1.25 m behind the front axle and 0.644 m above the road.
 SUV_LOADS = tuple(
-    PointMass(name=name, mass=mass, position=position)
+    PointMass(name=name, mass=mass, position=np.array(position))
     for name, mass, position in (
         ("front_passenger", 75.0, (0.10, -0.42, 0.26)),
         ("rear_left_passenger", 80.0, (-0.75, 0.42, 0.26)),

@@ -9,6 +9,7 @@ from estimators.score import rms_pct
 from scenarios import mass
 from scenarios.catalogue import Settings
 from scenarios.limits import UNITS, law_limit, run
+from scenarios.study import Case, Run, limit, observe, real_drive, variation
 from twin import OUTPUTS, PARAMETERS, Twin, TwinError, Vehicle, noise_sd
 
 AX = OUTPUTS.index("ax")
@@ -23,9 +24,9 @@ def only(channel, sd):
 def short_sensitivity(parameter, share=1.0):
     return sensitivities(
         Twin(Vehicle.load("suv")),
-        mass.real_drive(SHORT),
+        real_drive(mass.STUDY.target, SHORT),
         [parameter],
-        mass.variation(),
+        variation(),
         speed=0.0,
         offsets={parameter: share * OFFSETS[parameter]},
     )
@@ -183,14 +184,14 @@ def test_least_squares_on_simulated_noise_reach_the_bound():
 
 @pytest.mark.parametrize("parameter", PARAMETERS)
 def test_half_the_offset_changes_no_sensitivity(parameter):
-    drive = mass.real_drive(SHORT)
+    drive = real_drive(mass.STUDY.target, SHORT)
     sd = noise_sd(drive.measurements, 10.0)
     whole, half = (short_sensitivity(parameter, share) / sd for share in (1.0, 0.5))
     assert np.linalg.norm(whole - half) < 0.01 * np.linalg.norm(half)
 
 
 def test_mass_bound_from_acceleration_is_that_of_force_over_mass():
-    drive = mass.real_drive(SHORT)
+    drive = real_drive(mass.STUDY.target, SHORT)
     bound = limits(["mass"], short_sensitivity("mass"), only(AX, 0.5))
     total = Twin(Vehicle.load("suv_loaded")).model.body_mass.sum()
     expected = total * 0.5 / np.sqrt(np.sum(drive.channel("ax") ** 2))  # d(F/M)/dM = -a/M
@@ -201,8 +202,8 @@ def test_sensitivities_hang_on_neither_the_twin_s_past_nor_the_other_parameters(
     twin = Twin(Vehicle.load("suv"))
     twin.set_parameters(np.array([100.0, *np.zeros(9)]))
     twin.reset(30.0)
-    drive = mass.real_drive(SHORT)
-    both = sensitivities(twin, drive, ["cm_x", "mass"], mass.variation(), speed=0.0)
+    drive = real_drive(mass.STUDY.target, SHORT)
+    both = sensitivities(twin, drive, ["cm_x", "mass"], variation(), speed=0.0)
     assert both.shape == (2, len(drive), len(OUTPUTS))
     assert (both[1] == short_sensitivity("mass")[0]).all()
 
@@ -216,36 +217,58 @@ def test_sensitivities_hang_on_neither_the_twin_s_past_nor_the_other_parameters(
 )
 def test_parameter_that_cannot_be_set_is_refused(parameters, at, message):
     with pytest.raises(TwinError, match=message):
-        sensitivities(Twin(Vehicle.load("suv")), mass.real_drive(SHORT), parameters, at, speed=0.0)
+        sensitivities(
+            Twin(Vehicle.load("suv")),
+            real_drive(mass.STUDY.target, SHORT),
+            parameters,
+            at,
+            speed=0.0,
+        )
 
 
 # Scenarios
 
 
 def test_law_that_uses_all_of_its_channel_has_that_channel_s_bound():
-    drive = mass.real_drive(SHORT)
+    drive = real_drive(mass.STUDY.target, SHORT)
     sensitivity, sd = short_sensitivity("mass"), noise_sd(drive.measurements, 10.0)
     paper, default = (
-        law_limit(mass.LAWS[name], sensitivity, drive, sd) for name in ("til-paper", "til")
+        law_limit(mass.STUDY.laws[name][0], sensitivity, drive, sd) for name in ("til-paper", "til")
     )
     assert paper == limits(["mass"], sensitivity, only(AX, sd[AX])).single[0]
     assert default > paper  # it rests at a standstill and fits an offset
 
 
 def test_default_mass_law_comes_close_to_its_limit():
-    case = mass.Case(snr=10.0, cm_known=True, paper=None)
+    case, law = mass.STUDY.cases[1], mass.STUDY.laws["til"][0]
     errors, duration = [], 10.0
     for seed in range(20):
-        what = {"law": "til", "case": case, "initial": 0.0, "duration": duration}
-        drive, estimate = mass.observe(mass.Run(seed=seed, **what))
-        errors.append(rms_pct(estimate["mass"], mass.variation()["mass"], drive.dt))
+        drive, estimate = observe(
+            Run(
+                study=mass.STUDY.target,
+                estimator="til",
+                case=case,
+                seed=seed,
+                initial=(0.0,),
+                duration=duration,
+            )
+        )
+        errors.append(rms_pct(estimate["mass"], variation()["mass"], drive.dt))
     rms = np.sqrt(np.mean(np.square(errors)))
-    assert rms == pytest.approx(mass.limit(case, duration), rel=0.5)  # 3 sd of 20 seeds
+    assert rms == pytest.approx(limit(mass.STUDY, case, law, duration), rel=0.5)  # 3 sd of 20 seeds
 
 
-@pytest.mark.parametrize(("snr", "cm_known"), [(np.inf, True), (10.0, False)])
-def test_run_without_noise_or_with_a_wrong_model_has_no_limit(snr, cm_known):
-    assert mass.limit(mass.Case(snr=snr, cm_known=cm_known, paper=None), SHORT) is None
+@pytest.mark.parametrize(
+    "case",
+    [
+        Case(name="noiseless", snr=np.inf),
+        Case(name="wrong CM", snr=10.0, known=("mass",)),
+        Case(name="noisy road", snr=10.0, road_noise=0.1),
+        Case(name="coloured noise", snr=10.0, noise_on="accelerations"),
+    ],
+)
+def test_case_that_the_bound_does_not_fit_has_no_limit(case):
+    assert limit(mass.STUDY, case, mass.STUDY.laws["til"][0], SHORT) is None
 
 
 @pytest.fixture(scope="module")
@@ -258,7 +281,7 @@ def test_rows_are_in_percent_of_the_variation(mass_limits):
     rows = {(r.case, r.quantity, r.metric): r for r in mass_limits[0].rows}
     row = rows["ax alone, moving", "mass", "limit_single"]
     assert (row.estimator, row.unit, row.seeds) == ("cramer-rao", "%", 1)
-    drive = mass.real_drive(8.0)
+    drive = real_drive(mass.STUDY.target, 8.0)
     moving = drive.truth["wheel_speed_fl"] >= 3.0
     sd = noise_sd(drive.measurements, 10.0)[AX]
     total = Twin(Vehicle.load("suv_loaded")).model.body_mass.sum()

@@ -7,9 +7,11 @@ from estimators.observer import Observer
 from scenarios import mass
 from scenarios.manoeuvres import urban
 from scenarios.record import record
+from scenarios.study import CM, variation
 from twin import OUTPUTS, PARAMETERS, STATES, Twin, TwinError, Vehicle, with_noise
 
 DURATION = 12.0
+(TIL,), (PAPER,) = mass.STUDY.laws.values()
 
 
 @pytest.fixture(scope="module")
@@ -27,21 +29,21 @@ def observer(*laws, gains=None):
 
 
 def known():
-    return {name: mass.variation()[name] for name in mass.CM}
+    return {name: variation()[name] for name in CM}
 
 
 def test_twin_that_knows_the_load_repeats_the_vehicle(clean):
     open_loop = observer()
-    open_loop.reset(0.0, mass.variation())
+    open_loop.reset(0.0, variation())
     estimate = open_loop.run(clean)
     np.testing.assert_allclose(estimate.outputs, clean.measurements, atol=1e-9)
     truth = np.column_stack([clean.truth[name] for name in STATES])
     np.testing.assert_allclose(estimate.states, truth, atol=1e-9)
 
 
-@pytest.mark.parametrize("law", list(mass.LAWS))
+@pytest.mark.parametrize("law", list(mass.STUDY.laws))
 def test_each_mass_law_converges_without_noise(clean, law):
-    til = observer(mass.LAWS[law])
+    til = observer(mass.STUDY.laws[law][0])
     til.reset(0.0, known())
     error = til.run(clean)["mass"] - 355.0
     assert error[0] < -350.0
@@ -50,15 +52,15 @@ def test_each_mass_law_converges_without_noise(clean, law):
 
 def test_gain_with_the_printed_sign_would_run_away(clean):
     """A law that adds a - a~ for a > 0, as in print, is ours with a negative gain."""
-    til = observer(mass.LAWS["til-paper"])
+    til = observer(PAPER)
     til._laws.gain[:] *= -1.0
     til.reset(0.0, {**known(), "mass": 200.0})
     assert til.run(clean)["mass"][-1] < 100.0
 
 
 def test_mass_stays_where_the_twin_is_right(clean):
-    til = observer(mass.LAWS["til"])
-    til.reset(0.0, mass.variation())
+    til = observer(TIL)
+    til.reset(0.0, variation())
     np.testing.assert_allclose(til.run(clean)["mass"], 355.0, atol=1e-6)
 
 
@@ -66,11 +68,9 @@ def test_measured_sign_is_biased_by_noise_and_the_twin_is_not(drive):
     """At a = a~ only noise is left: the paper's instrument turns it into a drift."""
     drift = {}
     for instrument in ("measured", "twin"):
-        law = dataclasses.replace(
-            mass.LAWS["til-paper"], instrument=instrument, gain=20.0, least_wheel_speed=3.0
-        )
+        law = dataclasses.replace(PAPER, instrument=instrument, gain=20.0, least_wheel_speed=3.0)
         til = observer(law)
-        til.reset(0.0, mass.variation())
+        til.reset(0.0, variation())
         drift[instrument] = til.run(drive)["mass"][-1] - 355.0
     assert abs(drift["measured"]) > 15.0
     assert abs(drift["twin"]) < 3.0
@@ -78,7 +78,7 @@ def test_measured_sign_is_biased_by_noise_and_the_twin_is_not(drive):
 
 def test_one_sample_path_and_whole_drive_agree_to_the_bit(drive):
     gains = {("vx", "ax"): 0.1, ("yaw_rate", "yaw_rate"): 5.0}
-    whole, single = (observer(mass.LAWS["til"], gains=gains) for _ in range(2))
+    whole, single = (observer(TIL, gains=gains) for _ in range(2))
     whole.reset(0.0)
     single.reset(0.0)
     estimate = whole.run(drive)
@@ -91,7 +91,7 @@ def test_one_sample_path_and_whole_drive_agree_to_the_bit(drive):
 
 
 def test_reset_forgets_the_drive_before(drive):
-    til = observer(mass.LAWS["til"])
+    til = observer(TIL)
     runs = []
     for _ in range(2):
         til.reset(0.0, {"mass": 100.0})
@@ -101,12 +101,12 @@ def test_reset_forgets_the_drive_before(drive):
 
 def test_linear_law_pulls_a_state_to_its_measurement(clean):
     """A twin that starts 1 m/s too fast is pulled back by its wheel speeds."""
-    slow = dataclasses.replace(mass.LAWS["til"], prior_sd=1e-9, drift=0.0)
+    slow = dataclasses.replace(TIL, prior_sd=1e-9, drift=0.0)
     gains = {(f"wheel_speed_{w}", f"wheel_speed_{w}"): 50.0 for w in ("fl", "fr", "rl", "rr")}
     error = {}
     for name, k in (("free", None), ("pulled", gains)):
         til = observer(slow, gains=k)
-        til.reset(1.0, mass.variation())
+        til.reset(1.0, variation())
         error[name] = abs(til.run(clean)["vx"][-1] - clean.truth["vx"][-1])
     assert error["pulled"] < 0.2 * error["free"]
 
@@ -114,7 +114,7 @@ def test_linear_law_pulls_a_state_to_its_measurement(clean):
 def test_gains_mean_the_same_at_half_the_step(tmp_path, clean):
     text = Vehicle.load("suv").source.read_text().replace('timestep="0.001"', 'timestep="0.0005"')
     (tmp_path / "half.xml").write_text(text)
-    law = dataclasses.replace(mass.LAWS["til-paper"], instrument="twin")
+    law = dataclasses.replace(PAPER, instrument="twin")
     ends = []
     for name, dt in (("suv", 0.001), (str(tmp_path / "half.xml"), 0.0005)):
         twin = Vehicle.load(name)
@@ -128,7 +128,7 @@ def test_gains_mean_the_same_at_half_the_step(tmp_path, clean):
 
 
 def test_law_rests_while_the_car_stands(drive):
-    til = observer(mass.LAWS["til"])
+    til = observer(TIL)
     til.reset(0.0)
     standing = drive.truth["vx"] < 0.5
     estimate = til.run(drive)["mass"]
@@ -149,7 +149,7 @@ def test_law_rests_while_the_car_stands(drive):
 )
 def test_law_refuses_what_it_cannot_use(change, message):
     with pytest.raises(TwinError, match=message):
-        dataclasses.replace(mass.LAWS["til"], **change)
+        dataclasses.replace(TIL, **change)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_observer_refuses_gains_it_cannot_use(gains, message):
 def test_measurement_that_is_no_number_is_named(drive):
     bad = drive.measurements.copy()
     bad[17, OUTPUTS.index("yaw_rate")] = np.nan
-    til = observer(mass.LAWS["til"])
+    til = observer(TIL)
     with pytest.raises(TwinError, match="drive: yaw_rate is nan in sample 17"):
         til.run(drive.replace(measurements=bad))
     with pytest.raises(TwinError, match="update: yaw_rate is nan"):

@@ -124,7 +124,15 @@ def test_random_walk_reaches_the_rear_after_the_delay_on_both_sides():
 
 def test_known_road_is_off_by_a_uniform_factor():
     heights = np.full((5000, 4), 0.02)
-    factor = noisy_heights(np.random.default_rng(0), heights, 0.1) / heights
+    factor = noisy_heights(np.random.default_rng(0), heights, 0.1, lag=145) / heights
     assert factor.min() >= 0.9
     assert factor.max() <= 1.1
     assert factor.std() == pytest.approx(0.1 / np.sqrt(3), rel=0.02)
+
+
+def test_rear_wheels_follow_on_the_front_wheels_noisy_road():
+    heights = np.full((5000, 4), 0.02)
+    fl, fr, rl, rr = noisy_heights(np.random.default_rng(0), heights, 0.1, lag=145).T
+    assert (fl == fr).all()
+    assert (rl == rr).all()
+    assert (rl[145:] == fl[:-145]).all()

@@ -114,15 +114,20 @@ def random_walk_heights(
     return np.column_stack([front, front, rear, rear])
 
 
-def noisy_heights(rng: np.random.Generator, heights: Array, epsilon: float) -> Array:
+def noisy_heights(rng: np.random.Generator, heights: Array, epsilon: float, lag: int) -> Array:
     """Known road heights with the multiplicative noise of TiL Eq. (17).
+
+    It enters on the front wheels' profile, left and right alike; the rear wheels follow on it.
 
     Args:
         rng: the source of chance.
         heights: [m]. Shape (n, 4).
         epsilon: half width of the uniform factor about one.
+        lag: samples by which the rear axle follows.
 
     Returns:
-        Heights, each times its own draw from [1 - epsilon, 1 + epsilon]. Shape (n, 4).
+        Heights times draws from [1 - epsilon, 1 + epsilon]. Shape (n, 4).
     """
-    return heights * rng.uniform(1 - epsilon, 1 + epsilon, heights.shape)
+    factor = rng.uniform(1 - epsilon, 1 + epsilon, len(heights) + lag)
+    front, rear = factor[lag:], factor[: len(heights)]
+    return heights * np.column_stack([front, front, rear, rear])

@@ -1,0 +1,100 @@
+"""What an observer needs of a simulator, and what it returns for one with names of its own."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.estimate import Estimate
+from twin import TwinError
+
+Array = NDArray[np.float64]
+
+
+@runtime_checkable
+class BlackBox(Protocol):
+    """A simulator that can stand in for `twin.Twin`: the truck, another's car, an FMU.
+
+    Names follow `twin.INPUTS`, `twin.OUTPUTS`, `twin.STATES` and `twin.PARAMETERS` as far as they
+    mean the same. Arrays that a method returns belong to the caller.
+    """
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the measurements."""
+        ...
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the load parameters, each the delta from the nominal vehicle."""
+        ...
+
+    @property
+    def dt(self) -> float:
+        """Step [s]."""
+        ...
+
+    def reset(self, speed: float = 0.0) -> None:
+        """Settles at a speed [m/s] under the parameters in force."""
+        ...
+
+    def step(self, u: Array) -> Array:
+        """Advances by a step under the inputs (nu,); returns the outputs (ny,) before it.
+
+        Raises:
+            TwinError: the simulation has blown up.
+        """
+        ...
+
+    def correct(self, dx: Array) -> None:
+        """Adds (nx,) to the states."""
+        ...
+
+    def set_parameters(self, p: Array) -> Array:
+        """Sets the parameters (np,); returns what is physically valid of them."""
+        ...
+
+    def read_states(self) -> Array:
+        """The states (nx,) now."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedEstimate(Estimate):
+    """An observer's run with a black box whose names are not those of the cars.
+
+    The shapes follow the names; `nominal` is NaN, since a black box does not tell it.
+
+    Attributes:
+        state_names: nx names.
+        parameter_names: np names.
+        output_names: ny names.
+    """
+
+    state_names: tuple[str, ...]
+    parameter_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Array:
+        """The (N,) history of a parameter, as a delta, or of a state or output of the black box."""
+        tables = (
+            (self.parameter_names, self.parameters),
+            (self.state_names, self.states),
+            (self.output_names, self.outputs),
+        )
+        for names, table in tables:
+            if name in names:
+                return table[:, names.index(name)]
+        allowed = ", ".join(dict.fromkeys(n for names, _ in tables for n in names))
+        raise TwinError(f"estimate: has no {name!r}; has {allowed}")
