@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators import kalman_bucy_laws as laws
-from twin.errors import TwinError
-from twin.truck_parameters import TruckParameters
+from twin import TruckParameters, TwinError
 
 Array = NDArray[np.float64]
 

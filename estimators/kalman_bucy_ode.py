@@ -16,8 +16,7 @@ from estimators.kalman_bucy import (
     compile_law,
     estimate,
 )
-from twin.errors import TwinError
-from twin.truck_parameters import TruckParameters
+from twin import TruckParameters, TwinError
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ import subprocess
 import sys
 import uuid
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -31,7 +32,7 @@ BAND = 0.1  # of the variation, TiL Section 4
 
 # Where curves coincide the truth, drawn last, is a thin line within the twin's broad one.
 # Colours: the twin and what it estimates, the truth, its band, the noisy measurement
-_TWIN, _TRUTH, _BAND, _MEASURED = (235, 120, 50), (70, 190, 130), (60, 105, 85), (125, 130, 140)
+TWIN, TRUTH, BAND_COLOUR, MEASURED = (235, 120, 50), (70, 190, 130), (60, 105, 85), (125, 130, 140)
 # The measurement whose residual tells most of a parameter: TiL Eqs. (14), (15), (18)
 _SIGNAL = {
     **{"mass": "ax", "cm_x": "yaw_rate", "cm_y": "roll_rate", "cm_z": "roll_rate"},
@@ -40,7 +41,7 @@ _SIGNAL = {
 }
 
 
-class _Line(NamedTuple):
+class Line(NamedTuple):
     """A series of a plot: (N,) values and how they are drawn."""
 
     entity: str
@@ -50,12 +51,12 @@ class _Line(NamedTuple):
     width: float
 
 
-class _Plot(NamedTuple):
+class Plot(NamedTuple):
     """Series that belong in one view, under one entity."""
 
     entity: str
     title: str
-    lines: list[_Line]
+    lines: list[Line]
 
 
 def write_timeline(
@@ -81,26 +82,41 @@ def write_timeline(
         TwinError: a name is unknown, the arrays do not belong together, or the file cannot be
             written.
     """
-    import rerun as rr
-
     path = Path(path)
     _check(path, drive, estimate, parameters)
     plots = [_parameter_plot(name, drive, estimate) for name in parameters]
     signals = dict.fromkeys([_SIGNAL[name] for name in parameters] or ["ax"])
     others = [*(_signal_plot(name, drive, estimate) for name in signals), _speed(drive, estimate)]
-    moved = timeline_3d.motion(drive, estimate, _samples(drive.time, FRAME_RATE))
+    moved = timeline_3d.motion(drive, estimate, frames(drive.time))
     scene = timeline_3d.scene("vehicle" if drive.truth else "twin", moved)
     model = vehicle.compile()
 
+    with recording_to(path, _blueprint(plots, others, scene), title, drive.settings) as recording:
+        timeline_3d.log_car(recording, model, moved)
+        for plot in (*plots, *others):
+            send_plot(recording, drive.time, plot)
+
+
+@contextmanager
+def recording_to(
+    path: Path, blueprint: rrb.Blueprint, title: str, settings: Mapping[str, Any]
+) -> Iterator[rr.RecordingStream]:
+    """Lends a recording that is at the path, whole, once the block has ended well.
+
+    Raises:
+        TwinError: the name does not end in .rrd, or the file cannot be written.
+    """
+    import rerun as rr
+
+    if path.suffix != ".rrd":
+        raise twin.TwinError(f"{path}: a timeline's name ends in {path.suffix!r}; allowed: '.rrd'")
     recording = rr.RecordingStream(APPLICATION, recording_id=uuid.uuid4())
     partial = path.with_name(f".{path.stem}.{uuid.uuid4().hex}.rrd")
     try:
-        recording.save(partial, default_blueprint=_blueprint(plots, others, scene))
+        recording.save(partial, default_blueprint=blueprint)
         recording.send_recording_name(title)
-        _send_settings(recording, drive.settings)
-        timeline_3d.log_car(recording, model, moved)
-        for plot in (*plots, *others):
-            _send_plot(recording, drive.time, plot)
+        _send_settings(recording, settings)
+        yield recording
         recording.flush()
         recording.disconnect()
         _check_whole(partial)
@@ -128,8 +144,6 @@ def view(path: str | Path) -> None:
 
 
 def _check(path: Path, drive: twin.Drive, estimate: Estimate, parameters: Sequence[str]) -> None:
-    if path.suffix != ".rrd":
-        raise twin.TwinError(f"{path}: a timeline's name ends in {path.suffix!r}; allowed: '.rrd'")
     for name in parameters:
         if name not in twin.PARAMETERS:
             allowed = ", ".join(twin.PARAMETERS)
@@ -153,6 +167,11 @@ def _check_whole(path: Path) -> None:
         raise OSError("its end is missing; is the disk full?") from error
 
 
+def frames(time: Array) -> NDArray[np.int64]:
+    """Indices of the samples that 3D shows."""
+    return _samples(time, FRAME_RATE)
+
+
 def _samples(time: Array, rate: float) -> NDArray[np.int64]:
     """Indices of samples at no more than a rate [Hz], the first and the last among them."""
     period = np.floor((time - time[0]) * rate + 1e-6)
@@ -160,40 +179,41 @@ def _samples(time: Array, rate: float) -> NDArray[np.int64]:
     return np.union1d(first, [time.size - 1])
 
 
-def _parameter_plot(name: str, drive: twin.Drive, estimate: Estimate) -> _Plot:
+def _parameter_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
     lines = []
     if name in drive.truth:
         truth = drive.truth[name] - estimate.nominal[twin.PARAMETERS.index(name)]
         band = BAND * np.abs(truth).max()
         lines = [
-            _Line("upper", f"+{BAND:.0%} of the variation", truth + band, _BAND, 1.0),
-            _Line("lower", f"-{BAND:.0%} of the variation", truth - band, _BAND, 1.0),
-            _Line("truth", "truth", truth, _TRUTH, 2.0),
+            Line("upper", f"+{BAND:.0%} of the variation", truth + band, BAND_COLOUR, 1.0),
+            Line("lower", f"-{BAND:.0%} of the variation", truth - band, BAND_COLOUR, 1.0),
+            Line("truth", "truth", truth, TRUTH, 2.0),
         ]
-    lines.append(_Line("estimate", "estimate", estimate[name], _TWIN, 2.5))
+    lines.append(Line("estimate", "estimate", estimate[name], TWIN, 2.5))
     unit = {"m": "kg", "c": "m", "J": "kg m²"}[name[0]]
-    return _Plot(f"parameters/{name}", f"{name}: change from nominal [{unit}]", lines)
+    return Plot(f"parameters/{name}", f"{name}: change from nominal [{unit}]", lines)
 
 
-def _signal_plot(name: str, drive: twin.Drive, estimate: Estimate) -> _Plot:
+def _signal_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
     lines = []
     if name in drive.output_names:
-        lines.append(_Line("measured", "measured", drive.channel(name), _MEASURED, 1.0))
+        lines.append(Line("measured", "measured", drive.channel(name), MEASURED, 1.0))
     if name in drive.truth:
-        lines.append(_Line("vehicle", "vehicle, without noise", drive.truth[name], _TRUTH, 1.2))
-    lines.append(_Line("twin", "twin", estimate[name], _TWIN, 3.0))
-    return _Plot(f"signals/{name}", f"{name} [{'m/s²' if name[0] == 'a' else 'rad/s'}]", lines)
+        lines.append(Line("vehicle", "vehicle, without noise", drive.truth[name], TRUTH, 1.2))
+    lines.append(Line("twin", "twin", estimate[name], TWIN, 3.0))
+    return Plot(f"signals/{name}", f"{name} [{'m/s²' if name[0] == 'a' else 'rad/s'}]", lines)
 
 
-def _speed(drive: twin.Drive, estimate: Estimate) -> _Plot:
+def _speed(drive: twin.Drive, estimate: Estimate) -> Plot:
     lines = (
-        [_Line("vehicle", "vehicle", drive.truth["vx"], _TRUTH, 1.2)] if "vx" in drive.truth else []
+        [Line("vehicle", "vehicle", drive.truth["vx"], TRUTH, 1.2)] if "vx" in drive.truth else []
     )
-    lines.append(_Line("twin", "twin", estimate["vx"], _TWIN, 3.0))
-    return _Plot("speed", "speed, vx [m/s]", lines)
+    lines.append(Line("twin", "twin", estimate["vx"], TWIN, 3.0))
+    return Plot("speed", "speed, vx [m/s]", lines)
 
 
-def _send_plot(recording: rr.RecordingStream, time: Array, plot: _Plot) -> None:
+def send_plot(recording: rr.RecordingStream, time: Array, plot: Plot) -> None:
+    """Logs the series of a plot over time (N,) [s]."""
     import rerun as rr
 
     samples = _samples(time, PLOT_RATE)
@@ -222,7 +242,7 @@ def _send_settings(recording: rr.RecordingStream, settings: Mapping[str, Any]) -
 
 
 def _blueprint(
-    plots: Sequence[_Plot], others: Sequence[_Plot], scene: rrb.Spatial3DView
+    plots: Sequence[Plot], others: Sequence[Plot], scene: rrb.Spatial3DView
 ) -> rrb.Blueprint:
     import rerun.blueprint as rrb
 
@@ -230,10 +250,10 @@ def _blueprint(
     columns = 1 if len(small) <= 4 else 2
     # Where plots are many, one legend of each kind leaves room for the curves.
     explained = {plot.entity for plot in (small if columns == 1 else [*plots[:1], *others[:1]])}
-    views = [_view(plot, legend=plot.entity in explained) for plot in small]
+    views = [plot_view(plot, legend=plot.entity in explained) for plot in small]
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(scene, _view(others[-1], legend=True), row_shares=[3, 1]),
+            rrb.Vertical(scene, plot_view(others[-1], legend=True), row_shares=[3, 1]),
             rrb.Grid(*views, grid_columns=columns),
             column_shares=[3, 2] if columns == 1 else [1, 1],
         ),
@@ -243,16 +263,32 @@ def _blueprint(
     )
 
 
-def _view(plot: _Plot, *, legend: bool) -> rrb.TimeSeriesView:
+def plot_view(
+    plot: Plot,
+    *,
+    legend: bool,
+    left: bool = False,
+    limits: tuple[float, float] | None = None,
+) -> rrb.TimeSeriesView:
+    """The view of a plot, over all of time.
+
+    Args:
+        plot: what it shows.
+        legend: whether it explains the series, in a corner below.
+        left: which corner.
+        limits: of the vertical axis; by default all fits.
+    """
     import rerun as rr
     import rerun.blueprint as rrb
 
     everything = rr.TimeRange(
         start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
     )
+    corner = rrb.Corner2D.LeftBottom if left else rrb.Corner2D.RightBottom
     return rrb.TimeSeriesView(
         origin=plot.entity,
         name=plot.title,
         axis_x=rrb.TimeAxis(view_range=everything),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightBottom, visible=legend),
+        axis_y=rrb.ScalarAxis(range=limits) if limits else None,
+        plot_legend=rrb.PlotLegend(corner, visible=legend),
     )

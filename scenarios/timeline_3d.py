@@ -153,20 +153,26 @@ def _unit(vectors: Array) -> Array:
 
 def scene(subject: str, moved: Motion) -> rrb.Spatial3DView:
     """The view of the car on a ground grid, the eye behind its right shoulder and following it."""
-    import rerun.blueprint as rrb
-
     start, yaw = moved.states[0, :3], moved.states[0, 5]
     turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     forces = f", tyre forces (1 m = {NEWTONS_PER_METRE / 1000:g} kN)"
+    name = subject if moved.forces is None else subject + forces
+    return view_of(name, start + turn @ (-5.2, -3.9, 2.4), start)
+
+
+def view_of(name: str, eye: Array, target: Array) -> rrb.Spatial3DView:
+    """A view of the world on a ground grid; the eye (3,) looks at a target (3,) and follows it."""
+    import rerun.blueprint as rrb
+
     return rrb.Spatial3DView(
         origin=WORLD,
-        name=subject if moved.forces is None else subject + forces,
+        name=name,
         background=(24, 27, 32),
         line_grid=rrb.LineGrid3D(spacing=5.0, color=(255, 255, 255, 40)),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=start + turn @ (-5.2, -3.9, 2.4),
-            look_target=start,
+            position=eye,
+            look_target=target,
             tracking_entity=f"{WORLD}/chassis/boxes",  # an eye can only follow what is drawn
         ),
     )
@@ -178,21 +184,61 @@ def log_car(recording: rr.RecordingStream, model: mujoco.MjModel, moved: Motion)
 
     placed = poses(model, moved)
     points, axes = contacts(placed, moved.road)
-    recording.log(WORLD, rr.ViewCoordinates.FLU, static=True)
     index = [rr.TimeColumn("time", duration=moved.time)]
+    log_bodies(recording, model, index, placed.positions, placed.quaternions)
+    path = rr.LineStrips3D([points.mean(axis=1)], colors=_PATH_COLOUR, radii=0.04)
+    recording.log(f"{WORLD}/path", path, static=True)
+    _log_road(recording, points)
+    if moved.forces is not None:
+        vectors = np.einsum("nwi,nwij->nwj", moved.forces, axes) / NEWTONS_PER_METRE
+        _log_forces(recording, index, points, vectors)
+
+
+def _log_road(recording: rr.RecordingStream, points: Array) -> None:
+    """Logs the road as a ribbon under the front wheels, to scale; the lighter, the higher.
+
+    Args:
+        recording: to log to.
+        points: (n, 4, 3) where the wheels touch the road [m].
+    """
+    import rerun as rr
+
+    left, right = points[:, 0], points[:, 1]
+    shoulder = 0.5 * (left - right)
+    edges = np.stack([left + shoulder, right - shoulder], axis=1)
+    vertices = edges.reshape(-1, 3)
+    height = vertices[:, 2] - vertices[:, 2].min()
+    shade = 50.0 + 130.0 * height / max(height.max(), 1e-3)
+    corner = 2 * np.arange(len(points) - 1)[:, None, None]
+    triangles = (corner + np.array([[0, 1, 2], [2, 1, 3]])).reshape(-1, 3)
+    ribbon = rr.Mesh3D(
+        vertex_positions=vertices,
+        triangle_indices=triangles,
+        vertex_normals=np.tile([0.0, 0.0, 1.0], (len(vertices), 1)),
+        vertex_colors=np.repeat(shade[:, None], 3, axis=1).astype(np.uint8),
+    )
+    recording.log(f"{WORLD}/road", ribbon, static=True)
+
+
+def log_bodies(
+    recording: rr.RecordingStream,
+    model: mujoco.MjModel,
+    index: list[rr.TimeColumn],
+    positions: Array,
+    quaternions: Array,
+) -> None:
+    """Logs the shapes of all bodies, and their poses over n frames as in `Poses`."""
+    import rerun as rr
+
+    recording.log(WORLD, rr.ViewCoordinates.FLU, static=True)
     for body in np.unique(model.geom_bodyid[model.geom_bodyid > 0]):
         name = f"{WORLD}/{model.body(body).name}"
         _log_shapes(recording, name, model, body)
         columns = rr.Transform3D.columns(
-            translation=placed.positions[:, body],
-            quaternion=placed.quaternions[:, body][:, [1, 2, 3, 0]],
+            translation=positions[:, body],
+            quaternion=quaternions[:, body][:, [1, 2, 3, 0]],
         )
         recording.send_columns(name, index, columns)
-    path = rr.LineStrips3D([points.mean(axis=1)], colors=_PATH_COLOUR, radii=0.04)
-    recording.log(f"{WORLD}/path", path, static=True)
-    if moved.forces is not None:
-        vectors = np.einsum("nwi,nwij->nwj", moved.forces, axes) / NEWTONS_PER_METRE
-        _log_forces(recording, index, points, vectors)
 
 
 def _log_forces(

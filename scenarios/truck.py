@@ -1,127 +1,62 @@
-"""The scenario of KBF: a truck on an ISO 8608 road whose load changes while it drives."""
+"""The scenario of KBF: a truck's load changes twice while it drives over a rough road.
 
-from dataclasses import dataclass
-from typing import NamedTuple
+Kalman-Bucy filters and the Twin-in-the-Loop observer look for it on the same drives, in both
+readings of the paper's noise.
+"""
 
-import numpy as np
-from numpy.typing import NDArray
+import math
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
 
-from twin.road import iso8608_road
-from twin.truck import LoadStage, Truck, TruckRecord
-from twin.truck_parameters import SprungMass, TruckParameters
+from scenarios.catalogue import Scenario, Settings
+from scenarios.result import Result
+from scenarios.truck_drive import FULL_DURATION, NOISE, TruckCase, make_drive
+from scenarios.truck_estimators import ESTIMATORS, some
+from scenarios.truck_score import run_cases
+from twin import TwinError
 
-Array = NDArray[np.float64]
-
-SAMPLE_TIME = 1e-3  # [s]
-LOAD_STEPS = ((7.0, 1.5), (14.0, 0.5))  # time [s], load by the nominal one: KBF Section 4
+ESTIMATED = ("kalman-bucy", "kalman-bucy-matched", "kalman-bucy-literal", "til")
 
 
-class NoiseReading(NamedTuple):
-    """KBF gives noise magnitudes and does not say of what: of deviations, or of variances.
+def cases(settings: Settings) -> list[TruckCase]:
+    """Both readings of the paper's noise, as long as the settings say.
 
-    Attributes:
-        acceleration: standard deviation of the process noise per sample [m/s2, rad/s2].
-        sensors: standard deviation of the three measured rates [m/s, rad/s, rad/s].
-        parameter_density: of the matched filter [1/s], tuned for this noise.
+    Raises:
+        TwinError: the settings ask for another noise.
     """
-
-    acceleration: float
-    sensors: tuple[float, float, float]
-    parameter_density: float
-
-
-NOISE = {
-    "std noise": NoiseReading(1e-3, (1e-3, 1e-4, 1e-4), 1.5e-3),
-    "variance noise": NoiseReading(1e-3**0.5, (1e-3**0.5, 1e-4**0.5, 1e-4**0.5), 2e-2),
-}
+    if not math.isnan(settings.snr):
+        raise TwinError(
+            f"truck: snr is {settings.snr:g}; it has no such setting, the paper names its noise"
+        )
+    duration = min(settings.duration or FULL_DURATION, FULL_DURATION)
+    return [TruckCase(name=name, noise=name, duration=duration) for name in NOISE]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TruckCase:
-    """A drive and how far the real truck is from what the filter believes (KBF, Table 1).
-
-    Attributes:
-        name: for the tables.
-        noise: a key of `NOISE`.
-        road_class: ISO 8608.
-        speed: [m/s]; not in the paper, chosen.
-        duration: [s]; not in the paper, as long again as the two other stages.
-        coherence_decay: of the two tracks [m], `iso8608_road`; the paper says only that they
-            differ. Chosen: all but waves of some 30 m and more are nearly independent.
-        gravity: of the real truck [m/s2].
-        gravity_aware: whether the filter knows it.
-        spring_factor: stiffness of the real springs by Table 1.
-        damper_factor: damping of the real dampers by Table 1.
-        deflection_offset: of all four measured deflections [m].
-        cm_x: of the real load ahead of the nominal centre of mass [m].
-    """
-
-    name: str = "std noise"
-    noise: str = "std noise"
-    road_class: str = "C"
-    speed: float = 15.0
-    duration: float = 21.0
-    coherence_decay: float = 20.0
-    gravity: float = 0.0
-    gravity_aware: bool = True
-    spring_factor: float = 1.0
-    damper_factor: float = 1.0
-    deflection_offset: float = 0.0
-    cm_x: float = 0.0
-
-
-class TruckDrive(NamedTuple):
-    """A recorded drive.
-
-    Attributes:
-        time: [s]. Shape (n,).
-        deflections: measured, columns `twin.truck.DEFLECTIONS`. Shape (n, 8).
-        rates: measured, columns `twin.truck.RATES`. Shape (n, 3).
-        truth: what really happened; for scoring only.
-    """
-
-    time: Array
-    deflections: Array
-    rates: Array
-    truth: TruckRecord
-
-
-def make_drive(case: TruckCase, seed: int) -> TruckDrive:
-    """Drives the truck over its road; the same case and seed give the same drive, to the bit.
-
-    The truck starts at rest on level ground and is on the road from the first sample on. Seeds
-    draw the road, the process noise and the sensor noise from streams of their own, so cases that
-    differ in something else share them.
-    """
-    road_rng, process_rng, sensor_rng = np.random.default_rng(seed).spawn(3)
-    noise = NOISE[case.noise]
-    truck = Truck(real_parameters(case), gravity=case.gravity)
-    n = round(case.duration / SAMPLE_TIME)
-    distance = case.speed * SAMPLE_TIME * np.arange(n)
-    length = max(distance[-1] + truck.parameters.wheelbase, 100.0)  # ISO's longest wave: 91 m
-    road = iso8608_road(
-        road_rng,
-        length=length,
-        road_class=case.road_class,
-        coherence_decay=case.coherence_decay,
+def run(settings: Settings) -> Result:
+    """The scenario."""
+    start = time.perf_counter()
+    rows = run_cases(cases(settings), some(*ESTIMATED), settings.seeds, jobs=settings.jobs)
+    return Result(
+        name="truck", settings=asdict(settings), seconds=time.perf_counter() - start, rows=rows
     )
-    heights = road.wheel_heights(distance, truck.parameters.wheelbase)
-    process = noise.acceleration * process_rng.standard_normal((n, 7))
-    nominal = truck.parameters.nominal
-    stages = [LoadStage(start, nominal.scaled(factor)) for start, factor in LOAD_STEPS]
-    record = truck.record(heights, [s for s in stages if s.start < case.duration], process)
-    deflections = record.deflections.copy()
-    deflections[:, :4] += case.deflection_offset
-    rates = record.rates + np.array(noise.sensors) * sensor_rng.standard_normal((n, 3))
-    return TruckDrive(record.time, deflections, rates, record)
 
 
-def real_parameters(case: TruckCase) -> TruckParameters:
-    """The real truck of a case."""
-    paper = TruckParameters()
-    springs, dampers = paper.spring_stiffness, paper.damping
-    return TruckParameters(
-        nominal=SprungMass(cm_x=case.cm_x),
-        spring_stiffness=(springs[0] * case.spring_factor, springs[1] * case.spring_factor),
-        damping=(dampers[0] * case.damper_factor, dampers[1] * case.damper_factor),
-    )
+def timeline(settings: Settings, path: Path) -> None:
+    """The first seed's drive under the smaller noise as a Rerun recording."""
+    from scenarios.timeline_truck import write_truck_timeline
+
+    case = cases(settings)[0]
+    drive = make_drive(case, settings.seeds[0])
+    estimates = {name: ESTIMATORS[name](case, drive) for name in ("kalman-bucy-matched", "til")}
+    write_truck_timeline(path, drive=drive, estimates=estimates, title="truck")
+
+
+SCENARIO = Scenario(run=run, timeline=timeline, vehicle="truck")
+
+
+if __name__ == "__main__":
+    from scenarios.__main__ import main
+
+    sys.exit(main(["run", "truck", *sys.argv[1:]]))

@@ -1,11 +1,16 @@
 """The tables of the truck: KBF Table 2, robustness, and the paper's claim about R and Q."""
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 from estimators.kalman_bucy import KalmanBucySettings
-from scenarios.truck import NOISE, TruckCase
-from scenarios.truck_score import ESTIMATORS, PARAMETERS, Row, filter_with, run_case
+from scenarios.result import Result, Row
+from scenarios.truck_drive import NOISE, TruckCase
+from scenarios.truck_estimators import ESTIMATORS, kalman_bucy, some
+from scenarios.truck_score import UNITS, run_cases
 from twin.truck_parameters import STANDARD_GRAVITY
 
 TABLE_2_CASES = tuple(TruckCase(name=name, noise=name) for name in NOISE)
@@ -21,7 +26,14 @@ ROBUSTNESS_CASES = (
     TruckCase(name="deflections +1 mm", deflection_offset=1e-3),
     TruckCase(name="CG 0.2 m ahead", cm_x=0.2),
     TruckCase(name="gravity on", gravity=STANDARD_GRAVITY),
-    TruckCase(name="gravity on, filter unaware", gravity=STANDARD_GRAVITY, gravity_aware=False),
+    TruckCase(name="gravity on, unaware", gravity=STANDARD_GRAVITY, gravity_aware=False),
+)
+ROBUSTNESS = (
+    "kalman-bucy",
+    "kalman-bucy-matched",
+    "kalman-bucy-detecting",
+    "kalman-bucy-sharp",
+    "til",
 )
 
 R_FACTORS = (1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2)
@@ -31,34 +43,32 @@ Q_DENSITIES = (1e-3, 1e-1, 1e1, 1e3, 1e5)
 """Q of the parameters by their nominal values squared [1/s]."""
 
 
-def table_2(seeds: Sequence[int], *, jobs: int = 1) -> list[Row]:
+def table_2(seeds: int, jobs: int, out: Path) -> Result:
     """Every estimator in both readings of the noise, beside KBF Table 2."""
-    return [row for case in TABLE_2_CASES for row in run_case(case, ESTIMATORS, seeds, jobs=jobs)]
+    start = time.perf_counter()
+    rows = run_cases(TABLE_2_CASES, ESTIMATORS, range(seeds), jobs=jobs, quantities=tuple(UNITS))
+    return _result("kbf-table-2", seeds, start, rows)
 
 
-def robustness(seeds: Sequence[int], *, jobs: int = 1) -> list[Row]:
-    """MAPE under model error: the real truck differs from what the filters believe."""
-    names = ("kalman-bucy", "kalman-bucy-matched", "kalman-bucy-detecting", "kalman-bucy-sharp")
-    estimators = {name: ESTIMATORS[name] for name in names}
-    rows = []
-    for case in ROBUSTNESS_CASES:
-        rows += _parameter_errors(run_case(case, estimators, seeds, jobs=jobs))
-    return rows
+def robustness(seeds: int, jobs: int, out: Path) -> Result:
+    """MAPE under model error: the real truck differs from what the estimators believe."""
+    start = time.perf_counter()
+    rows = run_cases(
+        ROBUSTNESS_CASES, some(*ROBUSTNESS), range(seeds), jobs=jobs, metrics=("mape_pct",)
+    )
+    return _result("kbf-robustness", seeds, start, rows)
 
 
-def tuning(seeds: Sequence[int], *, jobs: int = 1) -> list[Row]:
+def tuning(seeds: int, jobs: int, out: Path) -> Result:
     """KBF Section 4.1, "the lower the value of R compared to Q, the better": R and Q by decades."""
+    start = time.perf_counter()
     estimators = {
-        f"R x {factor:g}, q {density:g}": filter_with(
-            lambda case, factor=factor, density=density: _scaled(factor, density)
-        )
+        f"R x {factor:g}, q {density:g}": partial(kalman_bucy, settings=_scaled(factor, density))
         for factor in R_FACTORS
         for density in Q_DENSITIES
     }
-    rows = []
-    for case in TABLE_2_CASES:
-        rows += _parameter_errors(run_case(case, estimators, seeds, jobs=jobs))
-    return rows
+    rows = run_cases(TABLE_2_CASES, estimators, range(seeds), jobs=jobs, metrics=("mape_pct",))
+    return _result("kbf-tuning", seeds, start, rows)
 
 
 def _scaled(factor: float, density: float) -> KalmanBucySettings:
@@ -67,5 +77,7 @@ def _scaled(factor: float, density: float) -> KalmanBucySettings:
     return replace(paper, measurement_density=(z, roll, pitch), parameter_density=density)
 
 
-def _parameter_errors(rows: Sequence[Row]) -> list[Row]:
-    return [row for row in rows if row.metric == "mape_pct" and row.quantity in PARAMETERS]
+def _result(name: str, seeds: int, start: float, rows: Sequence[Row]) -> Result:
+    return Result(
+        name=name, settings={"seeds": seeds}, seconds=time.perf_counter() - start, rows=rows
+    )

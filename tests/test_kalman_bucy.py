@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from estimators.kalman_bucy import KalmanBucy, KalmanBucySettings, detecting, matched
-from twin.errors import TwinError
+from twin import TruckParameters, TwinError
 from twin.road import iso8608_road
 from twin.truck import LoadStage, Truck
-from twin.truck_parameters import SprungMass, TruckParameters
+from twin.truck_parameters import SprungMass
 
 DT = 1e-3
 NOMINAL = TruckParameters().nominal.parameters

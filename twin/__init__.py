@@ -11,13 +11,16 @@ from twin.drive import Drive
 from twin.errors import TwinError
 from twin.load import PARAMETERS, PointMass, RigidBody, loaded, parameter_deltas
 from twin.noise import noise_sd, with_noise
+from twin.truck_parameters import TruckParameters
 
 if TYPE_CHECKING:
+    from twin.truck_twin import TruckTwin
     from twin.twin import Snapshot, Twin, check_inputs
     from twin.vehicle import Vehicle
 
 _COMPILED = {
     "Snapshot": "twin.twin",
+    "TruckTwin": "twin.truck_twin",
     "Twin": "twin.twin",
     "Vehicle": "twin.vehicle",
     "check_inputs": "twin.twin",
@@ -34,6 +37,8 @@ __all__ = [
     "PointMass",
     "RigidBody",
     "Snapshot",
+    "TruckParameters",
+    "TruckTwin",
     "Twin",
     "TwinError",
     "Vehicle",
