@@ -4,20 +4,30 @@ What a user can mend is one line on standard error and exit status 2, Ctrl-C one
 traceback is a bug of ours.
 """
 
-import math
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import click
 
 from scenarios import catalogue
-from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Entry, Scenario, Settings
+from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Scenario, Settings
+from scenarios.options import (
+    STANDARD_OUTPUT,
+    Name,
+    OutputFile,
+    count_option,
+    dask_option,
+    duration_option,
+    jobs_option,
+    json_option,
+    name_argument,
+    snr_option,
+)
+from scenarios.report import PictureOf, Section, write_report
 from scenarios.result import Result, json_text, write_json
-
-STANDARD_OUTPUT = Path("-")
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -68,91 +78,6 @@ class Program(click.Group):
             raise
 
 
-class Name(click.ParamType):
-    """A name in a part of the catalogue."""
-
-    name = "name"
-
-    def __init__(self, kind: str, entries: dict[str, Entry]):
-        self.kind = kind
-        self.entries = entries
-
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The name itself, if it is known."""
-        if value not in self.entries:
-            self.fail(f"no {self.kind} {value!r}, only {', '.join(self.entries)}", param, ctx)
-        return value
-
-
-class OutputFile(click.Path):
-    """A file that can be written, which is tried before the long run."""
-
-    def __init__(self, *, suffix: str = "", allow_dash: bool = False):
-        super().__init__(dir_okay=False, writable=True, allow_dash=allow_dash, path_type=Path)
-        self.suffix = suffix
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The path of the file."""
-        path = cast(Path, super().convert(value, param, ctx))
-        if not path.name.endswith(self.suffix):
-            self.fail(f"{path} must end in {self.suffix}", param, ctx)
-        to_stream = self.allow_dash and path == STANDARD_OUTPUT
-        if not to_stream and (path.is_file() or not path.exists()):
-            try:
-                _try_to_write(path.parent)
-            except OSError as error:
-                self.fail(f"{path} cannot be written: {error.strerror}", param, ctx)
-        return path
-
-
-def _check_snr(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
-    if value is not None and (math.isnan(value) or value == -math.inf):
-        raise click.BadParameter(f"{value} is neither a number of dB nor inf")
-    return value
-
-
-def _check_duration(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
-    if value is not None and not 0.0 < value < math.inf:
-        raise click.BadParameter(f"{value:g} s is not positive and finite")
-    return value
-
-
-def _count_option(name: str, default: int, text: str, *, least: int = 1) -> Any:
-    return click.option(
-        name,
-        type=click.IntRange(least),
-        default=default,
-        show_default=True,
-        metavar="N",
-        help=text,
-    )
-
-
-name_argument = click.argument("name", type=Name("scenario", SCENARIOS))
-snr_option = click.option(
-    "--snr",
-    type=float,
-    callback=_check_snr,
-    metavar="DB",
-    help="Signal-to-noise ratio of the sensors; inf: no noise.  [default: the scenario's]",
-)
-duration_option = click.option(
-    "--duration",
-    type=float,
-    callback=_check_duration,
-    metavar="S",
-    help="Drive only the first so many seconds.",
-)
-jobs_option = _count_option("--jobs", 1, "Processes side by side.")
-json_option = click.option(
-    "--json",
-    "json_path",
-    type=OutputFile(allow_dash=True),
-    metavar="FILE",
-    help="Write the result as JSON; - writes it to standard output instead of the table.",
-)
-
-
 @click.group(cls=Program, no_args_is_help=False)
 def program() -> None:
     """Drives a car and its digital twin, and estimates what nobody measures."""
@@ -171,14 +96,15 @@ def list_() -> None:
 @program.command()
 @name_argument
 @snr_option
-@_count_option("--seed", 0, "First seed.", least=0)
-@_count_option("--seeds", 1, "How many seeds, counted up from the first.")
+@count_option("--seed", 0, "First seed.", least=0)
+@count_option("--seeds", 1, "How many seeds, counted up from the first.")
 @jobs_option
 @duration_option
 @click.option(
     "--rrd", type=OutputFile(suffix=".rrd"), metavar="FILE", help="Write the Rerun timeline."
 )
 @click.option("--view", is_flag=True, help="Show the timeline in a window until it is closed.")
+@dask_option
 @json_option
 def run(
     name: str,
@@ -189,12 +115,15 @@ def run(
     duration: float | None,
     rrd: Path | None,
     view: bool,
+    dask: str | None,
     json_path: Path | None,
 ) -> None:
     """Drive scenario NAME, once or over several seeds.
 
     The timeline shows the first seed.
     """
+    from scenarios.progress import cluster  # not at the top: it imports joblib
+
     scenario = catalogue.scenario(name)
     settings = Settings(
         snr=scenario.default_snr if snr is None else snr,
@@ -202,7 +131,9 @@ def run(
         jobs=jobs,
         duration=duration,
     )
-    _report(scenario.run(settings), json_path)
+    with cluster(dask):
+        result = scenario.run(settings)
+    _report(result, json_path)
     if rrd:
         scenario.timeline(settings, rrd)
     if view:
@@ -211,7 +142,7 @@ def run(
 
 @program.command()
 @click.argument("names", metavar="[NAME]...", type=Name("reproduction", REPRODUCTIONS), nargs=-1)
-@_count_option("--seeds", 20, "How many seeds, counted up from 0.")
+@count_option("--seeds", 20, "How many seeds, counted up from 0.")
 @jobs_option
 @click.option(
     "--out",
@@ -219,30 +150,45 @@ def run(
     metavar="DIR",
     default="out",
     show_default=True,
-    help="Folder for pictures; it is made if it is missing.",
+    help="Folder for pictures and report.html; it is made if it is missing.",
 )
+@dask_option
 @json_option
 def reproduce(
-    names: tuple[str, ...], seeds: int, jobs: int, out: Path, json_path: Path | None
+    names: tuple[str, ...],
+    seeds: int,
+    jobs: int,
+    out: Path,
+    dask: str | None,
+    json_path: Path | None,
 ) -> None:
     """Put a paper's tables and figures beside ours; without a NAME, all of them.
 
+    DIR/report.html shows all tables and pictures of the run on one page.
+
     JSON of one is that result; of several it is {"results": [...]} with one such object each.
     """
+    from scenarios.progress import cluster  # not at the top: it imports joblib
+
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _try_to_write(out)
     except OSError as error:
         raise Mistake(f"--out: {out} cannot be written: {error.strerror}") from error
-    results: list[Result] = []
-    for name in dict.fromkeys(names or REPRODUCTIONS):
-        result = catalogue.reproduction(name)(seeds, jobs, out)
-        if json_path != STANDARD_OUTPUT:
-            click.echo("\n" * bool(results), nl=False)  # between tables
-            _print_table(result)
-        results.append(result)
-    objects = [result.to_json() for result in results]
+    report = OutputFile().convert(out / "report.html", None, None)
+    sections: list[Section] = []
+    with cluster(dask):
+        for name in dict.fromkeys(names or REPRODUCTIONS):
+            picture = PictureOf(out, name)
+            result = catalogue.reproduction(name)(seeds, jobs, out)
+            if json_path != STANDARD_OUTPUT:
+                click.echo("\n" * bool(sections), nl=False)  # between tables
+                _print_table(result)
+            sections.append(
+                Section(result=result, summary=REPRODUCTIONS[name].summary, picture=picture.read())
+            )
+    objects = [section.result.to_json() for section in sections]
     _save(objects[0] if len(objects) == 1 else {"results": objects}, json_path)
+    write_report(sections, report)
 
 
 @program.command()
@@ -262,6 +208,28 @@ def limits(name: str, snr: float | None, duration: float | None, json_path: Path
     )
     result, text = catalogue.limits()(name, scenario, settings)
     _report(result, json_path, text)
+
+
+@program.command()
+@name_argument
+@click.option("--estimator", default="til", show_default=True, help="Whose gains.")
+@count_option("--evaluations", 30, "How many points to try.", least=2)
+@jobs_option
+@click.option(
+    "--out", type=OutputFile(suffix=".toml"), metavar="FILE", help="[default: out/tune-NAME.toml]"
+)
+@json_option
+def tune(
+    name: str, estimator: str, evaluations: int, jobs: int, out: Path | None, json_path: Path | None
+) -> None:
+    """Choose the gains of an estimator of scenario NAME, on seeds that no result is reported on.
+
+    Bayesian optimisation; FILE holds the best point tried and the one predicted best.
+    """
+    path = out or Path("out", f"tune-{name}.toml")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    result = catalogue.scenario(name).tune(estimator, evaluations, jobs, path)
+    _report(result, json_path)
 
 
 @program.command()
@@ -300,11 +268,6 @@ def _view(scenario: Scenario, settings: Settings, rrd: Path | None) -> None:
         path = Path(folder, "timeline.rrd")
         scenario.timeline(settings, path)
         view(path)
-
-
-def _try_to_write(folder: Path) -> None:
-    with tempfile.TemporaryFile(dir=folder):
-        pass
 
 
 if __name__ == "__main__":

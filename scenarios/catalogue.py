@@ -39,6 +39,12 @@ def _without_limits(*_: object) -> NoReturn:
     raise TwinError("limits: this scenario has none; allowed: one of a car with a constant load")
 
 
+def _without_gains(*_: object) -> NoReturn:
+    from twin.errors import TwinError  # not at the top: it imports NumPy
+
+    raise TwinError("tune: this scenario has no gains to choose; allowed: one of a car")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """What a scenario's module offers as `SCENARIO`.
@@ -50,6 +56,7 @@ class Scenario:
         vehicle: the twin's, by its name in `models`.
         default_snr: signal-to-noise ratio unless the user names one [dB]; NaN: it takes none.
         drive: of the real vehicle, without noise; by default `til limits` says it has none.
+        tune: chooses gains from (estimator, evaluations, jobs, TOML file to write).
         variation: by parameter what its load changes, around the twin's vehicle; as `drive`.
     """
 
@@ -59,6 +66,7 @@ class Scenario:
     default_snr: float = math.nan
     drive: Callable[[Settings], Drive] = _without_limits
     variation: Callable[[], Mapping[str, float]] = _without_limits
+    tune: Callable[[str, int, int, Path], Result] = _without_gains
 
 
 Reproduction = Callable[[int, int, Path], Result]

@@ -30,7 +30,7 @@ STUDY = Study(
         # TiL Eq. (14), corrected in sign
         "til-paper": (
             ParameterLaw(
-                parameter="mass", signal="ax", instrument="measured", form="sign", gain=200.0
+                parameter="mass", signal="ax", instrument="measured", form="sign", gain=420.0
             ),
         ),
     },

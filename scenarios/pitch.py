@@ -19,6 +19,7 @@ STUDY = Study(
     laws={
         # The noisy road drives the twin, so its own signal is no clean instrument. The measured one
         # of 150 ms ago is: independent of both noises of now, and in antiphase by the pitch mode.
+        # Gains are those of `til tune pitch`, rounded.
         "til": (
             ParameterLaw(
                 parameter="Jyy",
@@ -27,8 +28,8 @@ STUDY = Study(
                 lag=0.15,
                 scale=-3640.0,  # kg m2, the twin's chassis
                 prior_sd=600.0,
-                noise_density=0.005,  # rad/s2 per root of Hz
-                drift=2.0,
+                noise_density=0.003,  # rad/s2 per root of Hz
+                drift=15.0,
                 filter_time=0.08,
             ),
         ),
@@ -36,7 +37,7 @@ STUDY = Study(
         "til-paper": (
             ParameterLaw(
                 parameter="Jyy", signal="pitch_acceleration", instrument="measured", form="sign",
-                gain=1000.0,
+                gain=4200.0,
             ),
         ),
     },

@@ -1,6 +1,7 @@
-"""Progress on standard error, and work spread over processes under it."""
+"""Progress on standard error, and work spread over processes or a cluster under it."""
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar, cast
 
 import joblib
@@ -10,6 +11,7 @@ Item = TypeVar("Item")
 Output = TypeVar("Output")
 
 DELAY = 2.0  # [s] before a bar appears
+TIMEOUT = 10.0  # [s] for a cluster to answer
 
 
 def progress(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:
@@ -28,3 +30,39 @@ def parallel(
     run = joblib.Parallel(n_jobs=jobs, return_as="generator")
     outputs = cast(Iterator[Output], run(joblib.delayed(function)(item) for item in items))
     return list(progress(outputs, label, len(items)))
+
+
+@contextmanager
+def cluster(address: str | None) -> Iterator[None]:
+    """Inside, `parallel` works on the Dask cluster of that scheduler, whatever its jobs.
+
+    Args:
+        address: of the scheduler, as in "tcp://127.0.0.1:8786"; None: no cluster.
+
+    Raises:
+        TwinError: Dask is not installed, or neither scheduler nor a worker answers in time.
+    """
+    if address is None:
+        yield
+        return
+    from twin.errors import TwinError  # not at the top: twin imports MuJoCo and numba
+
+    try:
+        from distributed import Client
+    except ImportError:
+        raise TwinError(
+            "--dask: a cluster needs Dask: pip install 'twin-in-the-loop[dask]'"
+        ) from None
+    client = None
+    try:
+        client = Client(address, timeout=TIMEOUT)
+        client.wait_for_workers(1, timeout=TIMEOUT)
+    except (OSError, ValueError) as error:
+        if client:
+            client.close()
+        raise TwinError(
+            f"--dask: {address} is no cluster that answers within {TIMEOUT:g} s: {error}; allowed: "
+            "the address of a Dask scheduler with a worker, as in tcp://127.0.0.1:8786"
+        ) from error
+    with client, joblib.parallel_config(backend="dask"):
+        yield

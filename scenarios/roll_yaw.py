@@ -18,15 +18,16 @@ STUDY = Study(
     target="scenarios.roll_yaw:STUDY",
     manoeuvre=lambda duration: swept_steer(duration=duration),
     laws={
-        # The modes are those of the car on its springs and on its tyres at 25 m/s.
+        # The modes are those of the car on its springs and on its tyres at 25 m/s; gains are those
+        # of `til tune roll-yaw`, rounded.
         "til": (
             ParameterLaw(
                 parameter="Jxx",
                 signal="roll_acceleration",
                 scale=834.0,  # kg m2, the twin's chassis
                 prior_sd=150.0,
-                noise_density=0.02,  # rad/s2 per root of Hz
-                drift=0.4,
+                noise_density=0.0075,  # rad/s2 per root of Hz
+                drift=0.015,
                 filter_time=0.03,
                 mode_frequency=2.0,
                 mode_damping=0.5,
@@ -36,8 +37,8 @@ STUDY = Study(
                 signal="yaw_acceleration",
                 scale=3933.0,
                 prior_sd=700.0,
-                noise_density=0.02,
-                drift=2.0,
+                noise_density=0.014,
+                drift=0.07,
                 filter_time=0.03,
                 mode_frequency=0.8,
                 mode_damping=0.65,
@@ -47,11 +48,11 @@ STUDY = Study(
         "til-paper": (
             ParameterLaw(
                 parameter="Jxx", signal="roll_acceleration", instrument="measured", form="sign",
-                gain=100.0,
+                gain=3800.0,
             ),
             ParameterLaw(
                 parameter="Jzz", signal="yaw_acceleration", instrument="measured", form="sign",
-                gain=1000.0,
+                gain=1400.0,
             ),
         ),
     },

@@ -7,8 +7,8 @@ crime but for load, noise and what a case says the twin does not know.
 import pkgutil
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import cache
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Literal
 
@@ -49,12 +49,12 @@ class Case:
         paper: the paper's rms [%] by parameter.
     """
 
-    name: str
+    name: str = field(compare=False)
     snr: float
     noise_on: Literal["rates", "accelerations"] = "rates"
     known: tuple[str, ...] = MASS + CM
     road_noise: float = 0.0
-    paper: tuple[tuple[str, float], ...] = ()
+    paper: tuple[tuple[str, float], ...] = field(default=(), compare=False)
 
     @property
     def is_random(self) -> bool:
@@ -180,6 +180,16 @@ def score(run: Run, laws: Sequence[ParameterLaw] | None = None) -> list[tuple[fl
     ]
 
 
+_DONE: dict[Run, list[tuple[float, float]]] = {}  # tables and figures share many runs
+
+
+def scores(todo: Sequence[Run], jobs: int, label: str) -> list[list[tuple[float, float]]]:
+    """`score` of each run, in parallel; none is made twice."""
+    missing = [run for run in dict.fromkeys(todo) if run not in _DONE]
+    _DONE.update(zip(missing, parallel(score, missing, jobs, label), strict=True))
+    return [_DONE[run] for run in todo]
+
+
 @cache
 def _sensitivity(target: str, duration: float | None, parameter: str) -> np.ndarray:
     drive = real_drive(target, duration)
@@ -229,7 +239,7 @@ def rows(
 ) -> list[Row]:
     """All estimators over all seeds in each case."""
     todo = runs(study, cases, seeds, duration)
-    scores = list(zip(todo, parallel(score, todo, jobs, study.name), strict=True))
+    scored = list(zip(todo, scores(todo, jobs, study.name), strict=True))
     found = []
     for case in cases:
         for i, law in enumerate(study.laws["til"]):
@@ -237,13 +247,13 @@ def rows(
             least = limit(study, case, law, duration)
             for estimator in study.laws:
                 values = [
-                    s[i] for run, s in scores if (run.case, run.estimator) == (case, estimator)
+                    s[i] for run, s in scored if (run.case, run.estimator) == (case, estimator)
                 ]
-                found += _both(values, case.name, law.parameter, estimator, paper, least)
+                found += _scored(values, case.name, law.parameter, estimator, paper, least)
     return found
 
 
-def _both(
+def _scored(
     values: Sequence[tuple[float, float]],
     case: str,
     quantity: str,
@@ -251,17 +261,18 @@ def _both(
     paper: float | None,
     least: float | None,
 ) -> list[Row]:
+    """Error and settling time; and the error's rms over seeds beside the bound on just that."""
     errors, times = zip(*values, strict=True)
-    return [
-        Row.over_seeds(
-            errors, case=case, quantity=quantity, metric="rms_pct", unit="%", estimator=estimator,
-            paper=paper, limit=least,
-        ),
-        Row.over_seeds(
-            times, case=case, quantity=quantity, metric="time_to_10pct", unit="s",
-            estimator=estimator,
-        ),
-    ]  # fmt: skip
+    one = partial(Row.over_seeds, case=case, quantity=quantity, estimator=estimator)
+    found = [
+        one(errors, metric="rms_pct", unit="%", paper=paper, limit=least),
+        one(times, metric="time_to_10pct", unit="s"),
+    ]
+    if least is not None:
+        ratio = float(np.sqrt(np.mean(np.square(errors)))) / least
+        row = one([ratio], metric="rms_over_limit", unit="1")
+        found.append(replace(row, seeds=len(errors)))
+    return found
 
 
 def scenario(study: Study) -> Scenario:
@@ -300,8 +311,14 @@ def scenario(study: Study) -> Scenario:
             title=study.name,
         )
 
+    def tune(estimator: str, evaluations: int, jobs: int, path: Path) -> Result:
+        from scenarios import tune  # not at the top: it is built on this module
+
+        return tune.run(study, estimator, evaluations, jobs, path)
+
     return Scenario(
         run=run,
+        tune=tune,
         timeline=timeline,
         default_snr=10.0,
         vehicle=TWIN,

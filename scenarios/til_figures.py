@@ -21,7 +21,7 @@ from scenarios.study import (
     noisy_drive,
     observe,
     real_drive,
-    score,
+    scores,
     variation,
 )
 
@@ -81,14 +81,14 @@ def figure_11(seeds: int, jobs: int, out: Path) -> Result:
         for epsilon in ROAD_NOISE
     ]
     paper = {0.0: 0.11, 0.1: 3.19}
-    scores = _scores(study, cases, "Jyy", seeds, jobs)
-    found = _rows(study, cases, "Jyy", scores, [paper.get(epsilon) for epsilon in ROAD_NOISE])
+    errors = _errors(study, cases, "Jyy", seeds, jobs)
+    found = _rows(study, cases, "Jyy", errors, [paper.get(epsilon) for epsilon in ROAD_NOISE])
     clean = real_drive(study.target, None)
     noisy = noisy_drive(clean, cases[2], 0)
     with pictures.figure(
         out / "til-figure-11.png", rows=2, shared=False, title="Pitch inertia and a noisy road"
     ) as (above, below):
-        _draw_errors(above, ROAD_NOISE, scores, paper)
+        _draw_errors(above, ROAD_NOISE, errors, paper)
         above.set(xlabel="half width of the road's noise", ylabel="rms error of Jyy [%]")
         part = slice(20000, 21000)
         for drive, label in ((noisy, "known to the twin"), (clean, "real")):
@@ -156,7 +156,7 @@ def _convergence(run: Run) -> list[tuple[float, float]]:
 
 def _draw_over_time(path: Path, study: Study, cases: Sequence[Case], drawn: str) -> None:
     count = len(cases) * len(study.parameters)
-    title = f"{study.name}: {', '.join(case.name for case in cases)}"
+    title = f"{study.name}, from several starts"
     with pictures.figure(path, rows=count + 1, title=title) as axes:
         for case, name, axis in (
             (case, name, axes[len(study.parameters) * c + p])
@@ -187,7 +187,7 @@ def _draw_drive(axis, study: Study, drawn: str) -> None:
     axis.set(xlabel="time [s]", ylabel=label)
 
 
-def _scores(
+def _errors(
     study: Study, cases: Sequence[Case], parameter: str, seeds: int, jobs: int
 ) -> dict[str, NDArray[np.float64]]:
     """Of each estimator, rms errors [%] of shape (cases, seeds)."""
@@ -198,7 +198,7 @@ def _scores(
         for seed in range(seeds)
     ]
     column = study.parameters.index(parameter)
-    values = np.array(parallel(score, todo, jobs, study.name))[:, column, 0]
+    values = np.array(scores(todo, jobs, study.name))[:, column, 0]
     return dict(zip(study.laws, values.reshape(len(study.laws), len(cases), seeds), strict=True))
 
 
@@ -206,7 +206,7 @@ def _rows(
     study: Study,
     cases: Sequence[Case],
     parameter: str,
-    scores: dict[str, NDArray[np.float64]],
+    errors: dict[str, NDArray[np.float64]],
     paper: Sequence[float | None],
 ) -> list[Row]:
     law = study.laws["til"][study.parameters.index(parameter)]
@@ -215,7 +215,7 @@ def _rows(
             values, case=case.name, quantity=parameter, metric="rms_pct", unit="%",
             estimator=estimator, paper=theirs, limit=limit(study, case, law, None),
         )
-        for estimator, by_case in scores.items()
+        for estimator, by_case in errors.items()
         for case, values, theirs in zip(cases, by_case, paper, strict=True)
     ]  # fmt: skip
 
@@ -229,10 +229,10 @@ def _over_noise(
         replace(case, snr=snr, name=case.name.replace("noisy", f"SNR {snr:g} dB", 1)) for snr in SNR
     ]
     paper = {10.0: dict(case.paper)[parameter]}
-    scores = _scores(study, cases, parameter, seeds, jobs)
-    found = _rows(study, cases, parameter, scores, [paper.get(snr) for snr in SNR])
+    errors = _errors(study, cases, parameter, seeds, jobs)
+    found = _rows(study, cases, parameter, errors, [paper.get(snr) for snr in SNR])
     with pictures.figure(out / f"{name}.png", title=f"Error of {parameter} over noise") as axis:
-        _draw_errors(axis, SNR, scores, paper)
+        _draw_errors(axis, SNR, errors, paper)
         bounds = [row.limit for row in found[: len(SNR)]]
         axis.plot(SNR, bounds, color="0.4", ls=":", label="Cramer-Rao bound of the rms")
         axis.set(xlabel="SNR [dB]", ylabel=f"rms error of {parameter} [%]")
@@ -241,9 +241,9 @@ def _over_noise(
 
 
 def _draw_errors(
-    axis, x: Sequence[float], scores: dict[str, NDArray[np.float64]], paper: dict[float, float]
+    axis, x: Sequence[float], errors: dict[str, NDArray[np.float64]], paper: dict[float, float]
 ) -> None:
-    for estimator, values in scores.items():
+    for estimator, values in errors.items():
         pictures.spread(axis, x, values, label=estimator)
     axis.plot(*zip(*paper.items(), strict=True), "kx", label="the paper's tables")
     axis.axhline(LIMIT, color="k", lw=1, ls="--", label="what the paper accepts")

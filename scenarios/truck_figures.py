@@ -36,7 +36,9 @@ def figure_5(seeds: int, jobs: int, out: Path) -> Result:
     )
     drive, estimates = _seed_0()
     with pictures.figure(
-        out / "kbf-figure-5.png", rows=3, title="KBF Figure 5: velocities of the chassis, road class C"
+        out / "kbf-figure-5.png",
+        rows=3,
+        title="KBF Figure 5: the chassis' velocities",
     ) as axes:
         for i, (ax, name) in enumerate(zip(axes, RATES, strict=True)):
             columns = {own: found.velocity[:, i] for own, found in estimates.items()}
