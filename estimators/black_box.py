@@ -1,13 +1,9 @@
-"""What an observer needs of a simulator, and what it returns for one with names of its own."""
+"""What an observer needs of a simulator."""
 
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-
-from estimators.estimate import Estimate
-from twin import TwinError
 
 Array = NDArray[np.float64]
 
@@ -68,33 +64,3 @@ class BlackBox(Protocol):
     def read_states(self) -> Array:
         """The states (nx,) now."""
         ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NamedEstimate(Estimate):
-    """An observer's run with a black box whose names are not those of the cars.
-
-    The shapes follow the names; `nominal` is NaN, since a black box does not tell it.
-
-    Attributes:
-        state_names: nx names.
-        parameter_names: np names.
-        output_names: ny names.
-    """
-
-    state_names: tuple[str, ...]
-    parameter_names: tuple[str, ...]
-    output_names: tuple[str, ...]
-
-    def __getitem__(self, name: str) -> Array:
-        """The (N,) history of a parameter, as a delta, or of a state or output of the black box."""
-        tables = (
-            (self.parameter_names, self.parameters),
-            (self.state_names, self.states),
-            (self.output_names, self.outputs),
-        )
-        for names, table in tables:
-            if name in names:
-                return table[:, names.index(name)]
-        allowed = ", ".join(dict.fromkeys(n for names, _ in tables for n in names))
-        raise TwinError(f"estimate: has no {name!r}; has {allowed}")

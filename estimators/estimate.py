@@ -16,10 +16,11 @@ class Estimate:
 
     Attributes:
         time: (N,) [s].
-        states: (N, 28) of the twin before each sample's correction, `twin.STATES`.
-        parameters: (N, 10) deltas from the nominal chassis after it, `twin.PARAMETERS`.
-        outputs: (N, 10) what the twin's sensors showed, `twin.OUTPUTS`.
-        nominal: (10,) the twin's own chassis, without deltas.
+        states: (N, nx) of the twin before each sample's correction.
+        parameters: (N, np) deltas from the nominal chassis after it.
+        outputs: (N, ny) what the twin's sensors showed.
+        nominal: (np,) the twin's own chassis, without deltas; NaN where a black box does not tell.
+        state_names, parameter_names, output_names: of the columns; by default those of a car.
     """
 
     time: Array
@@ -27,16 +28,19 @@ class Estimate:
     parameters: Array
     outputs: Array
     nominal: Array
+    state_names: tuple[str, ...] = STATES
+    parameter_names: tuple[str, ...] = PARAMETERS
+    output_names: tuple[str, ...] = OUTPUTS
 
     def __getitem__(self, name: str) -> Array:
         """The (N,) history of a parameter, as a delta, or of a state or output of the twin."""
-        for names, table in (
-            (PARAMETERS, self.parameters),
-            (STATES, self.states),
-            (OUTPUTS, self.outputs),
-        ):
+        tables = (
+            (self.parameter_names, self.parameters),
+            (self.state_names, self.states),
+            (self.output_names, self.outputs),
+        )
+        for names, table in tables:
             if name in names:
                 return table[:, names.index(name)]
-        raise TwinError(
-            f"estimate: has no {name!r}; has {', '.join(PARAMETERS + STATES + OUTPUTS)}"
-        )
+        allowed = ", ".join(dict.fromkeys(name for names, _ in tables for name in names))
+        raise TwinError(f"estimate: has no {name!r}; has {allowed}")

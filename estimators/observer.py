@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from estimators.black_box import BlackBox, NamedEstimate
+from estimators.black_box import BlackBox
 from estimators.estimate import Estimate
 from estimators.law import ParameterLaw, advance_law, compile_laws
 from twin import Drive, Twin, TwinError, check_inputs
@@ -149,7 +149,7 @@ class Observer:
             nominal=twin.car.nominal.copy(),
         )
 
-    def _run_black_box(self, drive: Drive) -> NamedEstimate:
+    def _run_black_box(self, drive: Drive) -> Estimate:
         twin = self.twin
         states, parameters, outputs = _histories(twin, len(drive))
         for k in range(len(drive)):
@@ -158,7 +158,7 @@ class Observer:
             self._update_black_box(drive.measurements[k])
             parameters[k] = self._memory.p
             outputs[k] = self._memory.y
-        return NamedEstimate(
+        return Estimate(
             time=drive.time,
             states=states,
             parameters=parameters,

@@ -136,7 +136,8 @@ def noisy_drive(clean: Drive, case: Case, seed: int) -> Drive:
         drive = _with_integrated_noise(clean, drive, case.snr, rng)
     if case.road_noise > 0.0:
         inputs = drive.inputs.copy()
-        lag = round(Twin(Vehicle.load(TWIN)).car.wheelbase / clean.truth["vx"].mean() / clean.dt)
+        # rear on front, at the constant speed of a drive on a road
+        lag = round(Twin(Vehicle.load(TWIN)).car.wheelbase / clean.truth["vx"][0] / clean.dt)
         inputs[:, 9:13] = noisy_heights(rng, inputs[:, 9:13], case.road_noise, lag)
         drive = drive.replace(inputs=inputs)
     return drive
