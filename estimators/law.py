@@ -30,7 +30,7 @@ Two more make a regressor of a better signal:
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numba import njit
@@ -129,23 +129,27 @@ class ParameterLaw:
         return ACCELERATIONS.get(self.signal, self.signal)
 
 
-class Laws(NamedTuple):
-    """Parameter laws as compiled code sees them, a row each."""
-
-    parameter: NDArray[np.int64]
-    output: NDArray[np.int64]
-    differentiated: NDArray[np.bool_]
-    measured: NDArray[np.bool_]
-    sign: NDArray[np.bool_]
-    gain: Array
-    scale: Array
-    intensity: Array  # noise_density squared
-    drift: Array
-    filter_time: Array
-    mode_frequency: Array  # [rad/s]
-    mode_damping: Array
-    lag: NDArray[np.int64]  # samples
-    least_wheel_speed: Array
+# A law as compiled code sees it. A record goes into a function as one pointer; a tuple of arrays
+# would cost more than the law.
+LAW_DTYPE = np.dtype(
+    [
+        ("parameter", np.int64),
+        ("output", np.int64),
+        ("differentiated", np.bool_),
+        ("measured", np.bool_),
+        ("sign", np.bool_),
+        ("gain", np.float64),
+        ("scale", np.float64),
+        ("intensity", np.float64),  # noise_density squared
+        ("drift", np.float64),
+        ("filter_time", np.float64),
+        ("mode_frequency", np.float64),  # [rad/s]
+        ("mode_damping", np.float64),
+        ("lag", np.int64),  # samples
+        ("least_wheel_speed", np.float64),
+    ],
+    align=True,
+)
 
 
 def compile_laws(
@@ -153,8 +157,8 @@ def compile_laws(
     dt: float,
     outputs: tuple[str, ...] = OUTPUTS,
     parameters: tuple[str, ...] = PARAMETERS,
-) -> tuple[Laws, Array]:
-    """The laws as arrays, and the memory, a row each, that they start with.
+) -> tuple[NDArray[np.void], Array]:
+    """The laws as records of `LAW_DTYPE`, and the memory, a row each, that they start with.
 
     Args:
         laws: what corrects which parameter.
@@ -167,23 +171,19 @@ def compile_laws(
     """
     for law in laws:
         _check_names(law, outputs, parameters)
-    table = Laws(
-        np.array([parameters.index(law.parameter) for law in laws], dtype=np.int64),
-        np.array([outputs.index(law.output) for law in laws], dtype=np.int64),
-        np.array([law.signal in ACCELERATIONS for law in laws], dtype=np.bool_),
-        np.array([law.instrument == "measured" for law in laws], dtype=np.bool_),
-        np.array([law.form == "sign" for law in laws], dtype=np.bool_),
-        np.array([law.gain for law in laws], dtype=np.float64),
-        np.array([law.scale for law in laws], dtype=np.float64),
-        np.array([law.noise_density**2 for law in laws], dtype=np.float64),
-        np.array([law.drift for law in laws], dtype=np.float64),
-        np.array([law.filter_time for law in laws], dtype=np.float64),
-        np.array([2.0 * math.pi * law.mode_frequency for law in laws], dtype=np.float64),
-        np.array([law.mode_damping for law in laws], dtype=np.float64),
-        np.array([round(law.lag / dt) for law in laws], dtype=np.int64),
-        np.array([law.least_wheel_speed for law in laws], dtype=np.float64),
-    )
-    memory = np.zeros((len(laws), RING + max((round(law.lag / dt) for law in laws), default=0)))
+    table = np.zeros(len(laws), LAW_DTYPE)
+    for row, law in zip(table, laws, strict=True):
+        for name in ("gain", "scale", "drift", "filter_time", "mode_damping", "least_wheel_speed"):
+            row[name] = getattr(law, name)
+        row["parameter"] = parameters.index(law.parameter)
+        row["output"] = outputs.index(law.output)
+        row["differentiated"] = law.signal in ACCELERATIONS
+        row["measured"] = law.instrument == "measured"
+        row["sign"] = law.form == "sign"
+        row["intensity"] = law.noise_density**2
+        row["mode_frequency"] = 2.0 * math.pi * law.mode_frequency
+        row["lag"] = round(law.lag / dt)
+    memory = np.zeros((len(laws), RING + max(table["lag"], default=0)))
     memory[:, PP] = [law.prior_sd**2 for law in laws]
     memory[:, OO] = [law.offset_sd**2 for law in laws]
     return table, memory
@@ -211,63 +211,57 @@ def _moving(y, least):
 
 
 @njit(cache=True)
-def advance_law(laws, k, memory, y, twin_y, dt):
-    """The correction of law k's parameter in one sample.
+def advance_law(law, memory, y, twin_y, dt):
+    """The correction of a law's parameter in one sample.
 
     Args:
-        laws: all laws.
-        k: the law's row.
-        memory: of this law.
+        law: a record of `LAW_DTYPE`.
+        memory: the law's own.
         y: (ny,) measurements.
         twin_y: (ny,) outputs of the twin.
         dt: sample time [s].
     """
-    a, a_twin = y[laws.output[k]], twin_y[laws.output[k]]
-    if laws.differentiated[k]:
+    a, a_twin = y[law.output], twin_y[law.output]
+    if law.differentiated:
         if memory[BEGUN] == 0.0:
             memory[BEGUN] = 1.0
-            memory[FILTER : FILTER + 2] = a
-            memory[FILTER + 2 : FILTER + 4] = a_twin
-        decay = dt / (laws.filter_time[k] + dt)
-        a = _differentiate(memory[FILTER : FILTER + 2], a, decay, dt)
-        a_twin = _differentiate(memory[FILTER + 2 : FILTER + 4], a_twin, decay, dt)
-    instrument = _regressor(laws, k, memory, a if laws.measured[k] else a_twin, dt)
-    least = laws.least_wheel_speed[k]
+            memory[FILTER], memory[FILTER + 1] = a, a
+            memory[FILTER + 2], memory[FILTER + 3] = a_twin, a_twin
+        a = _differentiate(memory, FILTER, a, law.filter_time, dt)
+        a_twin = _differentiate(memory, FILTER + 2, a_twin, law.filter_time, dt)
+    instrument = _regressor(law, memory, a if law.measured else a_twin, dt)
+    least = law.least_wheel_speed
     if least > 0.0 and not (_moving(y, least) and _moving(twin_y, least)):
         return 0.0
-    if laws.sign[k]:
-        return laws.gain[k] * dt * np.sign(instrument) * (a_twin - a)
-    return _fit(
-        memory,
-        instrument / laws.scale[k],
-        a_twin - a,
-        laws.intensity[k] / dt,
-        laws.drift[k] ** 2 * dt,
-    )
+    if law.sign:
+        return law.gain * dt * np.sign(instrument) * (a_twin - a)
+    noise, growth = law.intensity / dt, law.drift * law.drift * dt
+    return _fit(memory, instrument / law.scale, a_twin - a, noise, growth)
 
 
 @njit(cache=True)
-def _regressor(laws, k, memory, signal, dt):
+def _regressor(law, memory, signal, dt):
     """One sample of the instrument, filtered by the mode and lagged."""
-    if laws.mode_frequency[k] > 0.0:
-        w = laws.mode_frequency[k]
+    if law.mode_frequency > 0.0:
+        w = law.mode_frequency
         position, speed = memory[MODE], memory[MODE + 1]
-        signal -= 2.0 * laws.mode_damping[k] * w * speed + w * w * position
+        signal -= 2.0 * law.mode_damping * w * speed + w * w * position
         memory[MODE + 1] = speed + signal * dt
         memory[MODE] = position + memory[MODE + 1] * dt
-    if laws.lag[k] > 0:
+    if law.lag > 0:
         place = RING + int(memory[PLACE])
         signal, memory[place] = memory[place], signal
-        memory[PLACE] = (memory[PLACE] + 1.0) % laws.lag[k]
+        memory[PLACE] = (memory[PLACE] + 1.0) % law.lag
     return signal
 
 
 @njit(cache=True)
-def _differentiate(stages, value, decay, dt):
+def _differentiate(memory, stage, value, filter_time, dt):
     """One sample of s / (filter_time s + 1)^2: two low passes, the rate of the second."""
-    stages[0] += decay * (value - stages[0])
-    change = decay * (stages[0] - stages[1])
-    stages[1] += change
+    decay = dt / (filter_time + dt)
+    memory[stage] += decay * (value - memory[stage])
+    change = decay * (memory[stage] - memory[stage + 1])
+    memory[stage + 1] += change
     return change / dt
 
 

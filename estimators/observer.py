@@ -203,8 +203,15 @@ def _state_law(gains, memory, y, dt):
 @njit(cache=True, nogil=True)
 def _parameter_laws(laws, memory, y, dt):
     """Corrects memory.p: TiL Eq. (5)."""
-    for k in range(laws.parameter.size):
-        memory.p[laws.parameter[k]] += advance_law(laws, k, memory.laws[k], y, memory.y, dt)
+    for k in range(laws.size):
+        memory.p[laws[k].parameter] += advance_law(laws[k], memory.laws[k], y, memory.y, dt)
+
+
+@njit(cache=True)
+def _copy(source, target):
+    """Element by element, as slices of unknown length are checked and cost a tenth of a step."""
+    for i in range(target.size):
+        target[i] = source[i]
 
 
 @njit(cache=True, nogil=True)
@@ -212,10 +219,10 @@ def _run(car, gains, laws, memory, inputs, measurements, states, parameters, out
     """All samples of a drive; returns how many were sound."""
     for k in range(inputs.shape[0]):
         read_states(car, states[k])
-        memory.u[:] = inputs[k]
+        _copy(inputs[k], memory.u)
         _update(car, gains, laws, memory, measurements[k])
-        parameters[k] = memory.p
-        outputs[k] = memory.y
+        _copy(memory.p, parameters[k])
+        _copy(memory.y, outputs[k])
         if not is_sound(car):
             return k
     return inputs.shape[0]

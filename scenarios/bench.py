@@ -15,7 +15,7 @@ from scenarios.record import record
 from scenarios.result import Result, Row
 from twin import Drive, Twin, Vehicle, with_noise
 
-BLOCK = 2.0  # [s] of driving per measurement of what is compared
+BLOCK = 5.0  # [s] of driving per measurement of what is compared
 PAIRS = 30
 SUSTAINED = 60.0  # [s] of driving
 SAMPLES = 20000  # of the one-sample update

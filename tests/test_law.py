@@ -21,13 +21,13 @@ def corrections(law, y, twin_y):
     """What a law adds to its parameter in each sample, shape (n,)."""
     laws, memory = compile_laws([law], DT)
     pairs = zip(y, twin_y, strict=True)
-    return np.array([advance_law(laws, 0, memory[0], of, its, DT) for of, its in pairs])
+    return np.array([advance_law(laws[0], memory[0], of, its, DT) for of, its in pairs])
 
 
 def regressors(law, signal):
     """What a law makes of its instrument, shape (n,)."""
     laws, memory = compile_laws([law], DT)
-    return np.array([_regressor(laws, 0, memory[0], value, DT) for value in signal])
+    return np.array([_regressor(laws[0], memory[0], value, DT) for value in signal])
 
 
 def phasor(frequency, values):
@@ -131,7 +131,7 @@ def test_laws_of_one_observer_have_lags_of_their_own():
     )
     signal = np.arange(1.0, 21.0)
     for k, lag in enumerate((2, 5)):
-        lagged = [_regressor(laws, k, memory[k], value, DT) for value in signal]
+        lagged = [_regressor(laws[k], memory[k], value, DT) for value in signal]
         np.testing.assert_array_equal(lagged[lag:], signal[:-lag])
 
 
@@ -157,7 +157,7 @@ def fit(seed):
     laws, memory = compile_laws([FIT], DT)
     for k in range(SAMPLES):
         y[k, AX] -= TWIN_ACCELERATION[k] / SCALE * missing + disturbance[k]
-        missing -= advance_law(laws, 0, memory[0], y[k], twin_y[k], DT)
+        missing -= advance_law(laws[0], memory[0], y[k], twin_y[k], DT)
     return missing, memory[0, PP]
 
 
@@ -187,5 +187,5 @@ def test_drift_makes_the_variance_grow_where_nothing_is_learnt():
     laws, memory = compile_laws([law], DT)
     nothing = np.zeros(len(OUTPUTS))
     for _ in range(1000):
-        advance_law(laws, 0, memory[0], nothing, nothing, DT)
+        advance_law(laws[0], memory[0], nothing, nothing, DT)
     assert memory[0, PP] == pytest.approx(10.0**2 + 4.0**2 * 1.0)

@@ -53,7 +53,7 @@ def test_each_mass_law_converges_without_noise(clean, law):
 def test_gain_with_the_printed_sign_would_run_away(clean):
     """A law that adds a - a~ for a > 0, as in print, is ours with a negative gain."""
     til = observer(PAPER)
-    til._laws.gain[:] *= -1.0
+    til._laws["gain"] *= -1.0
     til.reset(0.0, {**known(), "mass": 200.0})
     assert til.run(clean)["mass"][-1] < 100.0
 

@@ -5,7 +5,7 @@ from numba import types
 from twin.boundary import VECTOR, behind
 from twin.car import CAR
 from twin.lanes import inlined, pointer
-from twin.library import mju_eig3
+from twin.libmujoco import mju_eig3
 
 # The least that is left of a chassis by corrections: of its mass, and of each principal moment.
 LEAST_SHARE = 0.3

@@ -11,7 +11,7 @@ from twin.contact import LATERAL, LONGITUDINAL, ROAD, combine, cross, difference
 from twin.elementary import clip
 from twin.four_tyres import four_tyres
 from twin.lanes import gather, inlined, load, pointer, scatter, unpack
-from twin.library import mj_step1, mj_step2
+from twin.libmujoco import mj_step1, mj_step2
 
 AIR_DENSITY = 1.2  # [kg/m3]
 STATES = 3  # columns of the tyre state
