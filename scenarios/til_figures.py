@@ -25,7 +25,7 @@ from scenarios.study import (
     variation,
 )
 
-SNR = (5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0)  # [dB], TiL Figures 5, 7, 8, 10
+SNR = (5.0, 7.5, 10.0, 15.0, 20.0)  # [dB], TiL Figures 5, 7, 8, 10
 ROAD_NOISE = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25)  # half widths of Eq. (17), TiL Figure 11
 STARTS = (-0.5, 0.0, 1.0, 2.0)  # shares of the variation believed at the start
 LIMIT = 10.0  # [%], what the paper accepts
