@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from estimators.law import ParameterLaw
 from scenarios.progress import parallel, progress
 from scenarios.result import Result, Row, replacing, versions
-from scenarios.study import CM, MASS, Case, Run, Study, score
+from scenarios.study import CM, MASS, Case, Run, Study, runs, score
 from twin import TwinError
 
 SEEDS = tuple(range(1000, 1004))
@@ -157,17 +157,7 @@ def _cost(
 ) -> float:
     """Geometric mean of the rms errors [%] of these gains."""
     laws = with_gains(study.laws[estimator], gains, [10.0**x for x in point])
-    todo = [
-        Run(
-            study=study.target,
-            estimator=estimator,
-            case=case,
-            seed=seed,
-            initial=(0.0,) * len(study.parameters),
-        )
-        for case in cases_of(study)
-        for seed in (SEEDS if case.is_random else SEEDS[:1])
-    ]
+    todo = [run for run in runs(study, cases_of(study), SEEDS) if run.estimator == estimator]
     errors = parallel(_Scored(laws), todo, jobs, "seeds")
     by_case: dict[str, list[NDArray[np.float64]]] = {}
     for one, error in zip(todo, errors, strict=True):
