@@ -37,7 +37,8 @@ def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
     """Scales records of `twin.tir.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
     for name, keys in TYRE_SCALES.items():
         for key in keys:
-            tyres[key] = tyres[key] * factors.get(name, 1.0)
+            column: NDArray[np.float64] = tyres[key]  # pyright: ignore[reportAssignmentType]
+            column *= factors.get(name, 1.0)
 
 
 def scale_model(model: mujoco.MjModel, factors: Mapping[str, float]) -> None:
