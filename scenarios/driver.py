@@ -43,9 +43,9 @@ class Driver(NamedTuple):
     wheelbase: float = 2.9  # [m]
     steering_ratio: float = 16.0  # hand wheel over road wheel
     understeer: float = 0.0013  # road-wheel angle over lateral acceleration [rad s2/m]
-    preview: float = 0.15  # how far ahead the bend and the pedals are taken [s]
+    preview: float = 0.2  # how far ahead the bend and the pedals are taken [s]
     look_ahead: float = 0.6  # [s]
-    yaw_gain: float = 0.05  # road-wheel angle over missing yaw rate [s]
+    yaw_gain: float = 0.08  # road-wheel angle over missing yaw rate [s]
     steering_rate: float = 15.0  # of the hand wheel [rad/s]
 
 

