@@ -107,7 +107,7 @@ def at(values, position):
 @njit(cache=True, nogil=True)
 def _locate(course, memory, x, y, direction):
     """How far left of the course [m], and how far to the left of it the travel [rad]."""
-    left = 0.0
+    left, heading = 0.0, 0.0
     for _ in range(2):
         position = memory[0] / course.step
         heading = at(course.heading, position)

@@ -26,7 +26,7 @@ class Path(NamedTuple):
     @property
     def distance(self) -> Array:
         """(M,) along the line [m]."""
-        return self.step * np.arange(self.x.size)
+        return np.arange(self.x.size, dtype=np.float64) * np.float64(self.step)
 
 
 class Piece(NamedTuple):
@@ -43,7 +43,7 @@ def path_of(pieces: Sequence[Piece], step: float = STEP) -> Path:
     Its last point is the last whole step; see `end_of` for the end.
     """
     ends = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
-    distance = step * np.arange(int(np.floor(ends[-1] / step + 1e-9)) + 1)
+    distance = np.float64(step) * np.arange(int(np.floor(ends[-1] / step + 1e-9)) + 1)
     nodes = np.union1d(distance, ends)  # so that no interval holds a corner of the curvature
     x, y = _positions(pieces, ends, nodes)
     at = np.searchsorted(nodes, distance)
@@ -63,10 +63,11 @@ def _positions(pieces: Sequence[Piece], ends: Array, nodes: Array) -> tuple[Arra
     lengths = np.diff(nodes)
     between = nodes[:-1, None] + lengths[:, None] * NODES
     heading = _bends(pieces, ends, between.ravel())[0].reshape(between.shape)
-    return tuple(
+    x, y = (
         np.concatenate([[0.0], np.cumsum(lengths * (direction(heading) @ WEIGHTS))])
         for direction in (np.cos, np.sin)
     )
+    return x, y
 
 
 def _bends(pieces: Sequence[Piece], ends: Array, distance: Array) -> tuple[Array, Array]:
