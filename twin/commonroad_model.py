@@ -7,10 +7,10 @@ wheel's torque is added to that wheel's equation: I dw/dt = -R F_x + torque.
 
 It has no drag, no rolling resistance and no road but a flat one; its tyres neither relax nor lose
 grip under load. It divides by zero as it comes to rest, and its tyres pull once a wheel has lifted.
+Ply steer has the sign of the camber: a front wheel's side force jumps by 0.12 kN as that passes 0.
 `twin.commonroad_axes` turns its states into ours.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -106,11 +106,14 @@ def fill_rates(car, x, torque, rates):
         rates[WHEEL + w] += torque[w] / car.I_y_w
 
 
+_fill_rates: Any = fill_rates
+
+
 @njit(cache=True, nogil=True)
 def derivative(car, x, torque):
     """The (29,) rates of their states x (29,) under the (4,) torques on the wheels [N m]."""
     rates = np.empty(STATES)
-    fill_rates(car, x.ctypes, torque.ctypes, rates.ctypes)
+    _fill_rates(car, x.ctypes, torque.ctypes, rates.ctypes)
     return rates
 
 
@@ -156,46 +159,6 @@ def is_sound(x):
         if not 0.0 < x[WHEEL + w] < 1e4:
             return False
     return x[VX] >= LEAST_SPEED
-
-
-@njit(cache=True)
-def _wheel(car, x, w):
-    """Slip, slip angle, camber, load [N] and forces ahead and to the right [N] of a wheel.
-
-    The lines of `vehicle_dynamics_mb` between the states and these, which it does not give out.
-    """
-    front = w < 2
-    side = 1.0 if w % 2 == 0 else -1.0
-    axle, arm, track = (FRONT, car.a, car.T_f) if front else (REAR, -car.b, car.T_r)
-    steer = x[STEER] if front else 0.0
-    ahead = x[VX] + side * 0.5 * track * x[YAW_RATE]
-    across = x[VY] + arm * x[YAW_RATE]
-    rolling = ahead * math.cos(steer) + across * math.sin(steer)
-    slip = 1.0 - car.R_w * x[WHEEL + w] / rolling
-    height = car.R_w - x[axle + AXLE_Z]
-    angle = math.atan((across - x[axle + AXLE_ROLL_RATE] * height) / ahead) - steer
-    hub = car.h_s - car.R_w
-    travel = (hub + x[axle + AXLE_Z] - x[Z]) / math.cos(x[ROLL]) - hub
-    travel += arm * x[PITCH] + side * 0.5 * (x[ROLL] - x[axle]) * track
-    d, e = (car.D_f, car.E_f) if front else (car.D_r, car.E_r)
-    camber = x[ROLL] + side * (d * travel + e * travel**2)
-    squeeze = x[axle + AXLE_Z] + car.R_w * (math.cos(x[axle]) - 1.0)
-    load = (squeeze - side * 0.5 * track * math.sin(x[axle])) * car.K_zt
-    fx = tire_model.formula_longitudinal(slip, camber, load, car.tire)
-    fy, friction = tire_model.formula_lateral(angle, camber, load, car.tire)
-    fx = tire_model.formula_longitudinal_comb(slip, angle, fx, car.tire)
-    fy = tire_model.formula_lateral_comb(slip, angle, camber, friction, load, fy, car.tire)
-    return slip, angle, camber, load, fx, fy
-
-
-@njit(cache=True, nogil=True)
-def tyres(car, x, out):
-    """Fills (4, 9) `twin.TYRE_OUTPUTS`, in our axes; the model has no moments: they are NaN."""
-    for w in range(4):
-        slip, angle, camber, load, fx, fy = _wheel(car, x, w)
-        out[w, 0], out[w, 1], out[w, 2] = fx, -fy, load
-        out[w, 3:6] = np.nan
-        out[w, 6], out[w, 7], out[w, 8] = -slip, -angle, camber
 
 
 def rolling(car: MultiBody, speed: float) -> Array:
