@@ -66,7 +66,7 @@ def record(
     manoeuvre: Manoeuvre | CourseManoeuvre,
     driver: Driver = Driver(),  # noqa: B008
 ) -> Drive:
-    """Drives the vehicle along a manoeuvre and records inputs, noise-free measurements and the truth.
+    """Drives a manoeuvre and records inputs, noise-free measurements and the truth.
 
     Truth holds every state by its name, sideslip [rad], the chassis' mass, CM and inertia, each
     tyre's forces, moments and slips (`fx_fl` ...) and the noise-free outputs that are no state.
