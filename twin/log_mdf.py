@@ -1,5 +1,7 @@
 """Logs and drives in ASAM MDF 4, by asammdf (extra `mdf`)."""
 
+import gc
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -81,14 +83,21 @@ def read_log(path: Path, time: tuple[str | None, float | None]) -> RawLog:
 def _read(path: Path) -> tuple[RawLog, str]:
     check_mdf(path)
     asammdf = _asammdf(path)
+    fault = ""
+    # On a damaged file asammdf leaves a half-made object behind, whose end is noisy
+    noise, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         with asammdf.MDF(path) as file:
             comment = str(file.header.description)
             channels, text = _channels(file)
-    except TwinError:
-        raise
-    except Exception as error:  # what asammdf raises on a damaged file is of every kind
-        raise TwinError(f"{path}: cannot be read as MDF: {reason(error)[:200]}") from error
+    except Exception as error:  # of every kind
+        fault = reason(error)[:200]
+    finally:
+        if fault:
+            gc.collect()
+        sys.unraisablehook = noise
+    if fault:
+        raise TwinError(f"{path}: cannot be read as MDF: {fault}")
     if not channels:
         raise TwinError(f"{path}: has no numeric channels; allowed: at least one")
     for name, channel in channels.items():
