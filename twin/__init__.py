@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from twin.channels import (
     EXTENDED,
+    FURTHER_OUTPUTS,
     INPUTS,
     LOAD,
     OUTPUTS,
@@ -43,6 +44,7 @@ _COMPILED = {
 
 __all__ = [
     "EXTENDED",
+    "FURTHER_OUTPUTS",
     "INPUTS",
     "LOAD",
     "OUTPUTS",

@@ -1,8 +1,11 @@
-"""The Magic Formula tyre, MF 5.2 (PAC2002): steady-state forces and moments, compiled.
+"""The Magic Formula tyre, MF 5.2 (PAC2002), 6.1 and 6.2: steady-state forces and moments, compiled.
 
-Equation numbers are those of Pacejka, *Tyre and Vehicle Dynamics*, 2nd ed., section 4.3.2, without
-turn slip and inflation pressure; where MF 5.2 has fewer coefficients than the book (stiffness and
-friction over camber) it is MF 5.2 that counts. Axes are ISO 8855, signs ISO-W: see `twin.tir`.
+Equation numbers are those of Pacejka, *Tyre and Vehicle Dynamics*, section 4.3.2, without turn
+slip: of the 2nd ed., where MF 5.2 has fewer coefficients than the book (stiffness and friction over
+camber) MF 5.2 counts; of the 3rd ed. for what is said of MF 6, see `twin.tir_6`. MF 5.2 has its
+further coefficients at 0; what differs beyond that is computed only if some tyre is of MF 6. Slip
+angle and inclination enter as such, not as tangent and sine (the book leaves the choice, 4.E3).
+Axes are ISO 8855, signs ISO-W: see `twin.tir`.
 
 Kept sane where the formula is extrapolated: outside its load range a tyre has the forces of the
 end of the range in proportion to the load; the inclination is limited to its range; curvatures
@@ -19,15 +22,21 @@ from typing import Any
 from numba import njit
 
 from twin.elementary import atan, clip, cos, exp, sin
-from twin.lanes import absolute, copysign, inlined, maximum, minimum, sqrt
+from twin.lanes import absolute, anywhere, copysign, inlined, maximum, where
+from twin.tyre_moments import (
+    force_arm,
+    overturning_moment,
+    residual_torque,
+    rolling_resistance,
+    trail,
+)
+from twin.tyre_shapes import LEAST_SHARE, bend, cos_arctan, sin_2_arctan
 
 Tyre = Any  # numpy.void, whose fields compiled code reads as attributes
 
 LEAST_FRICTION = 0.01  # peak friction coefficient, chosen: below wet ice
-LEAST_SHARE = 0.05  # of a factor that the formula could drive to zero or beyond, chosen
 LEAST_RELAXATION = 0.02  # [m], chosen: a lightly loaded tyre answers at once, but not faster
 LARGEST_SLIP = 1e6  # longitudinal slip; the force is that of sliding long before
-FASTEST = 10.0  # limit of the speed over LONGVL in the rolling resistance
 ROLLING_SPEED = 0.1  # [m/s], chosen: below it rolling resistance and trail fade out
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
@@ -72,25 +81,32 @@ def magic_formula(
     ky = _cornering_stiffness(tyre, fz, nominal, gamma)
     mu_y = _lateral_friction(tyre, dfz, gamma)
     fx0 = _pure_longitudinal(tyre, fz, dfz, kappa, gamma, kx)
-    shift_h, shift_v = _lateral_shifts(tyre, fz, dfz, gamma)
+    shift_h, shift_v = _lateral_shifts(tyre, fz, dfz, gamma, ky)
     fy0 = _pure_lateral(tyre, fz, dfz, alpha, gamma, ky, mu_y, shift_h, shift_v)
 
-    fx = _longitudinal_weight(tyre, dfz, kappa, alpha) * fx0
-    fy_weighted = _lateral_weight(tyre, dfz, kappa, alpha) * fy0  # F_y' of (4.E74)
+    fx = _longitudinal_weight(tyre, dfz, kappa, alpha, gamma) * fx0
+    weight = _lateral_weight(tyre, dfz, kappa, alpha, gamma)
+    fy_weighted = weight * fy0  # F_y' of (4.E74)
     fy = fy_weighted + _slip_induced_side_force(tyre, fz, dfz, kappa, alpha, gamma, mu_y)
 
-    trail = travel * _trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx / ky)
-    residual = _residual_torque(
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):  # MF 6: the force that the trail is an arm of is that of an upright wheel
+        fy_weighted = where(
+            is_6, weight * _upright_lateral(tyre, fz, dfz, nominal, alpha), fy_weighted
+        )
+
+    trail_length = travel * trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx / ky)
+    residual = residual_torque(
         tyre, fz, dfz, kappa, alpha, gamma, kx / ky, shift_h + shift_v / ky, ky / (mu_y * fz)
     )
-    arm = _force_arm(tyre, dfz, nominal, fy, gamma)
+    arm = force_arm(tyre, dfz, nominal, fy, gamma)
 
     return (
         share * fx,
         share * fy * side,
-        share * _overturning_moment(tyre, fz, nominal, fy, gamma) * side,
-        -share * travel * _rolling_resistance(tyre, fz, nominal, fx, vx),
-        share * (-trail * fy_weighted + residual + arm * fx) * side,  # (4.E71), (4.E72)
+        share * overturning_moment(tyre, fz, nominal, fy, gamma) * side,
+        -share * travel * rolling_resistance(tyre, fz, nominal, fx, vx, gamma),
+        share * (-trail_length * fy_weighted + residual + arm * fx) * side,  # (4.E71), (4.E72)
     )
 
 
@@ -117,6 +133,7 @@ def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, floa
 
     PAC2002: sigma_kappa = F_z (p_Tx1 + p_Tx2 df_z) exp(p_Tx3 df_z) R_0/F_z0,
     sigma_alpha = p_Ty1 sin(2 arctan(F_z/(p_Ty2 F_z0))) (1 - p_Ky3 |gamma|) R_0, both scaled.
+    MF 6: slip stiffness over that of the carcass; Besselink et al. 2010, Eqs. (14)-(17).
 
     Args:
         tyre: the tyre's record.
@@ -124,13 +141,24 @@ def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, floa
         gamma: inclination [rad].
     """
     _, fz, dfz, nominal = _load(tyre, fz)
-    gamma = _inclination(tyre, gamma) * tyre.lgay
+    inclination = _inclination(tyre, gamma)
+    gamma = inclination * tyre.lgay
     along = fz * (tyre.ptx1 + tyre.ptx2 * dfz) * exp(tyre.ptx3 * dfz) / nominal
-    across = tyre.pty1 * _sin_2_arctan(fz / (tyre.pty2 * nominal)) * tyre.lfzo
+    across = tyre.pty1 * sin_2_arctan(fz / (tyre.pty2 * nominal)) * tyre.lfzo
     across *= maximum(1.0 - tyre.pky3 * absolute(gamma), LEAST_SHARE)
+    along, across = along * tyre.unloaded_radius, across * tyre.unloaded_radius
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):
+        carcass_x = 1.0 + dfz * (tyre.pcfx1 + dfz * tyre.pcfx2)
+        carcass_y = 1.0 + dfz * (tyre.pcfy1 + dfz * tyre.pcfy2)
+        carcass_x = maximum(carcass_x, LEAST_SHARE) * tyre.longitudinal_stiffness
+        carcass_y = maximum(carcass_y, LEAST_SHARE) * tyre.lateral_stiffness
+        along = where(is_6, _slip_stiffness(tyre, fz, dfz) / carcass_x, along)
+        cornering = -_cornering_stiffness(tyre, fz, nominal, inclination)
+        across = where(is_6, cornering / carcass_y, across)
     return (
-        maximum(along * tyre.unloaded_radius * tyre.lsgkp, LEAST_RELAXATION),
-        maximum(across * tyre.unloaded_radius * tyre.lsgal, LEAST_RELAXATION),
+        maximum(along * tyre.lsgkp, LEAST_RELAXATION),
+        maximum(across * tyre.lsgal, LEAST_RELAXATION),
     )
 
 
@@ -147,7 +175,7 @@ def effective_radius(tyre: Tyre, fz: float) -> float:
     """
     deflection = clip(fz, 0.0, tyre.fzmax) / tyre.fnomin
     loss = tyre.dreff * atan(tyre.breff * deflection) + tyre.freff * deflection
-    radius = tyre.unloaded_radius - loss * tyre.fnomin / tyre.vertical_stiffness
+    radius = tyre.unloaded_radius + tyre.growth - loss * tyre.fnomin / tyre.vertical_stiffness
     return maximum(radius, 0.5 * tyre.unloaded_radius)
 
 
@@ -163,7 +191,7 @@ def _pure_longitudinal(tyre, fz, dfz, kappa, gamma, kx):
     d = maximum(mu, LEAST_FRICTION) * fz
     e = (tyre.pex1 + dfz * (tyre.pex2 + dfz * tyre.pex3)) * (1.0 - tyre.pex4 * copysign(1.0, slip))
     b = kx / (c * d)
-    return d * sin(c * _bend(b * slip, e * tyre.lex)) + shift_v
+    return d * sin(c * bend(b * slip, e * tyre.lex)) + shift_v
 
 
 @inlined
@@ -173,22 +201,35 @@ def _pure_lateral(tyre, fz, dfz, alpha, gamma, ky, mu, shift_h, shift_v):
     c = tyre.pcy1 * tyre.lcy
     d = mu * fz
     e = (tyre.pey1 + tyre.pey2 * dfz) * tyre.ley
-    e *= 1.0 - (tyre.pey3 + tyre.pey4 * gamma * tyre.lgay) * copysign(1.0, slip)
+    bent = (tyre.pey3 + tyre.pey4 * gamma * tyre.lgay) * copysign(1.0, slip)
+    e *= 1.0 + tyre.pey5 * gamma * gamma - bent
     b = ky / (c * d)
-    return d * sin(c * _bend(b * slip, e)) + shift_v
+    return d * sin(c * bend(b * slip, e)) + shift_v
 
 
 @inlined
-def _longitudinal_weight(tyre, dfz, kappa, alpha):
+def _upright_lateral(tyre, fz, dfz, nominal, alpha):
+    """Returns F_y0 [N] without inclination. (4.E32)."""
+    upright = 0.0 * alpha
+    ky = _cornering_stiffness(tyre, fz, nominal, upright)
+    mu = _lateral_friction(tyre, dfz, upright)
+    shift_h, shift_v = _lateral_shifts(tyre, fz, dfz, upright, ky)
+    return _pure_lateral(tyre, fz, dfz, alpha, upright, ky, mu, shift_h, shift_v)
+
+
+@inlined
+def _longitudinal_weight(tyre, dfz, kappa, alpha, gamma):
     """Returns G_xalpha, the share of F_x0 that side slip leaves. (4.E50)-(4.E57)."""
-    b = tyre.rbx1 * _cos_arctan(tyre.rbx2 * kappa) * tyre.lxal
+    b = tyre.rbx1 + tyre.rbx3 * gamma * gamma
+    b *= cos_arctan(tyre.rbx2 * kappa) * tyre.lxal
     return _weight(b, tyre.rcx1, tyre.rex1 + tyre.rex2 * dfz, alpha, tyre.rhx1)
 
 
 @inlined
-def _lateral_weight(tyre, dfz, kappa, alpha):
+def _lateral_weight(tyre, dfz, kappa, alpha, gamma):
     """Returns G_ykappa, the share of F_y0 that longitudinal slip leaves. (4.E59)-(4.E65)."""
-    b = tyre.rby1 * _cos_arctan(tyre.rby2 * (alpha - tyre.rby3)) * tyre.lyka
+    b = tyre.rby1 + tyre.rby4 * gamma * gamma
+    b *= cos_arctan(tyre.rby2 * (alpha - tyre.rby3)) * tyre.lyka
     shift = tyre.rhy1 + tyre.rhy2 * dfz
     return _weight(b, tyre.rcy1, tyre.rey1 + tyre.rey2 * dfz, kappa, shift)
 
@@ -196,24 +237,8 @@ def _lateral_weight(tyre, dfz, kappa, alpha):
 @inlined
 def _weight(b, c, e, slip, shift):
     """Returns a cosine weight that is 1 at no slip and falls to nought. (4.E51), (4.E59)."""
-    weight = maximum(cos(c * _bend(b * (slip + shift), e)), 0.0)
-    return weight / maximum(cos(c * _bend(b * shift, e)), LEAST_SHARE)
-
-
-@inlined
-def _bend(x, e):
-    """Returns the inner angle of the Magic Formula, its curvature E limited to 1. (4.E14)."""
-    return atan(x - minimum(e, 1.0) * (x - atan(x)))
-
-
-@inlined
-def _cos_arctan(x):
-    return 1.0 / sqrt(1.0 + x * x)
-
-
-@inlined
-def _sin_2_arctan(x):
-    return 2.0 * x / (1.0 + x * x)
+    weight = maximum(cos(c * bend(b * (slip + shift), e)), 0.0)
+    return weight / maximum(cos(c * bend(b * shift, e)), LEAST_SHARE)
 
 
 @inlined
@@ -246,7 +271,13 @@ def _slip_stiffness(tyre, fz, dfz):
 @inlined
 def _cornering_stiffness(tyre, fz, nominal, gamma):
     """Returns K_yalpha < 0 [N/rad]. (4.E25), in MF 5.2 with 1 - p_Ky3 |gamma|."""
-    upright = tyre.pky1 * nominal * _sin_2_arctan(fz / (tyre.pky2 * nominal)) * tyre.lky
+    rise = sin_2_arctan(fz / (tyre.pky2 * nominal))
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):  # p_Ky4 for 2, and p_Ky5
+        at = maximum(tyre.pky2 + tyre.pky5 * gamma * gamma, LEAST_SHARE * tyre.pky2)
+        general = sin(tyre.pky4 * atan(fz / (at * nominal)))
+        rise = where(is_6, maximum(general, LEAST_SHARE * rise), rise)
+    upright = tyre.pky1 * nominal * rise * tyre.lky
     return upright * maximum(1.0 - tyre.pky3 * absolute(gamma * tyre.lgay), LEAST_SHARE)
 
 
@@ -259,12 +290,17 @@ def _lateral_friction(tyre, dfz, gamma):
 
 
 @inlined
-def _lateral_shifts(tyre, fz, dfz, gamma):
-    """Returns S_Hy [rad] and S_Vy [N]: ply steer, conicity, camber. (4.E27)-(4.E29)."""
+def _lateral_shifts(tyre, fz, dfz, gamma, ky):
+    """Returns S_Hy [rad] and S_Vy [N]: ply steer, conicity, camber. (4.E27)-(4.E30)."""
     inclination = gamma * tyre.lgay
     horizontal = (tyre.phy1 + tyre.phy2 * dfz) * tyre.lhy + tyre.phy3 * inclination
     vertical = (tyre.pvy1 + tyre.pvy2 * dfz) * tyre.lvy
-    vertical += (tyre.pvy3 + tyre.pvy4 * dfz) * inclination
+    thrust = (tyre.pvy3 + tyre.pvy4 * dfz) * inclination
+    vertical += thrust
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):  # camber stiffness K_ygamma0 = F_z (p_Ky6 + p_Ky7 df_z)
+        camber = (tyre.pky6 + tyre.pky7 * dfz) * gamma - thrust * tyre.lmuy
+        horizontal += where(is_6, fz * camber / ky, 0.0)
     return horizontal, fz * vertical * tyre.lmuy
 
 
@@ -272,72 +308,5 @@ def _lateral_shifts(tyre, fz, dfz, gamma):
 def _slip_induced_side_force(tyre, fz, dfz, kappa, alpha, gamma, mu_y):
     """Returns S_Vykappa [N], the side force that driving or braking induces. (4.E66), (4.E67)."""
     d = mu_y * fz * (tyre.rvy1 + tyre.rvy2 * dfz + tyre.rvy3 * gamma)
-    d *= _cos_arctan(tyre.rvy4 * alpha)
+    d *= cos_arctan(tyre.rvy4 * alpha)
     return d * sin(tyre.rvy5 * atan(tyre.rvy6 * kappa)) * tyre.lvyka
-
-
-@inlined
-def _trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx_over_ky):
-    """Returns the pneumatic trail t [m] at combined slip. (4.E33)-(4.E35), (4.E40)-(4.E44)."""
-    gamma = gamma * tyre.lgaz
-    shift = tyre.qhz1 + tyre.qhz2 * dfz + (tyre.qhz3 + tyre.qhz4 * dfz) * gamma
-    b = tyre.qbz1 + dfz * (tyre.qbz2 + dfz * tyre.qbz3)
-    b *= (1.0 + tyre.qbz4 * gamma + tyre.qbz5 * absolute(gamma)) * tyre.lky / tyre.lmuy
-    c = tyre.qcz1
-    d = (tyre.qdz1 + tyre.qdz2 * dfz) * (1.0 + gamma * (tyre.qdz3 + gamma * tyre.qdz4))
-    d *= fz * tyre.unloaded_radius / nominal * tyre.ltr
-    e = tyre.qez1 + dfz * (tyre.qez2 + dfz * tyre.qez3)
-    e *= 1.0 + (tyre.qez4 + tyre.qez5 * gamma) * 2.0 / pi * atan(b * c * (alpha + shift))
-    slip = _equivalent_slip(alpha + shift, kappa, kx_over_ky)
-    return d * cos(c * _bend(b * slip, e)) * cos(alpha)
-
-
-@inlined
-def _residual_torque(tyre, fz, dfz, kappa, alpha, gamma, kx_over_ky, shift, by_cy):
-    """Returns M_zr [N m] at combined slip. (4.E36)-(4.E38), (4.E45)-(4.E47), (4.E75)."""
-    gamma = gamma * tyre.lgaz
-    b = tyre.qbz9 * tyre.lky / tyre.lmuy + tyre.qbz10 * by_cy
-    d = (tyre.qdz6 + tyre.qdz7 * dfz) * tyre.lres + (tyre.qdz8 + tyre.qdz9 * dfz) * gamma
-    d *= fz * tyre.unloaded_radius * tyre.lmuy
-    slip = _equivalent_slip(alpha + shift, kappa, kx_over_ky)
-    return d * _cos_arctan(b * slip) * cos(alpha)
-
-
-@inlined
-def _equivalent_slip(alpha, kappa, kx_over_ky):
-    """Returns the size of the equivalent slip angle [rad]. (4.E77), (4.E78).
-
-    Its sign is left out: trail and residual torque are even in it. The squared tangent is taken
-    from the sine, which costs a third of it.
-    """
-    sine, longitudinal = sin(alpha), kx_over_ky * kappa
-    tangent_squared = sine * sine / (1.0 - sine * sine)
-    return atan(sqrt(tangent_squared + longitudinal * longitudinal))
-
-
-@inlined
-def _force_arm(tyre, dfz, nominal, fy, gamma):
-    """Returns s [m], the arm of F_x about the contact's normal. (4.E76)."""
-    share = tyre.ssz1 + tyre.ssz2 * fy / nominal
-    share += (tyre.ssz3 + tyre.ssz4 * dfz) * gamma * tyre.lgaz
-    return share * tyre.unloaded_radius * tyre.ls
-
-
-@inlined
-def _overturning_moment(tyre, fz, nominal, fy, gamma):
-    """Returns M_x [N m]. (4.E69)."""
-    share = tyre.qsx1 * tyre.lvmx + (tyre.qsx3 * fy / nominal - tyre.qsx2 * gamma) * tyre.lmx
-    return share * fz * tyre.unloaded_radius
-
-
-@inlined
-def _rolling_resistance(tyre, fz, nominal, fx, vx):
-    """Returns the size of M_y [N m], not negative. (4.E70), in MF 5.2 in steady state."""
-    speed = minimum(absolute(vx) / tyre.longvl, FASTEST)
-    share = (
-        tyre.qsy1
-        + tyre.qsy2 * fx / nominal
-        + tyre.qsy3 * speed
-        + tyre.qsy4 * (speed * speed) * (speed * speed)
-    )
-    return maximum(share, 0.0) * fz * tyre.unloaded_radius * tyre.lmy
