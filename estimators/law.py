@@ -14,7 +14,16 @@ mass, and a correction has the form
 * the *form*: "sign", z = sgn(.), with a constant gain as in the paper; or "least-squares", z = the
   signal itself with the gains of a recursive least-squares fit with forgetting: the Kalman filter
   of e = (a~ / scale) missing + offset + noise. The offset, a bias of the sensor or gravity seen by
-  a car that stands otherwise than its twin, is fitted along: it does not pull the parameter.
+  a car that stands otherwise than its twin, is fitted along: it does not pull the parameter. The
+  form "integral", z = -1, is for a parameter that is itself a force: its gain has either sign.
+
+Laws may rest: at yaw rates beyond a gate (Eq. (24)), or where the instrument is too small to tell
+anything but the errors of the model.
+
+An observer that corrects the wheel speeds pulls on its twin: a correction K (w - w~) is a torque
+I K (w - w~) on the wheel, which the tyre hands on to the road. The twin's speed then settles where
+a~ = a whatever its mass, and hides it. *Compensation* takes that acceleration,
+sum K (w - w~) I / (R M), out of the twin's signal before anything is made of it.
 
 Two more make a regressor of a better signal:
 
@@ -30,7 +39,7 @@ Two more make a regressor of a better signal:
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numba import njit
@@ -39,6 +48,7 @@ from numpy.typing import NDArray
 from twin import OUTPUTS, PARAMETERS, TwinError
 
 Array = NDArray[np.float64]
+Form = Literal["sign", "least-squares", "integral"]
 
 # Signals that a law can use: what the sensors give, and accelerations [m/s2, rad/s2]. These come
 # from a measured rate by the same causal filter for vehicle and twin, s / (filter_time s + 1)^2: it
@@ -50,6 +60,7 @@ ACCELERATIONS = {
     "yaw_acceleration": "yaw_rate",
 }
 SIGNALS = (*OUTPUTS, *ACCELERATIONS)
+_YAW_RATE = OUTPUTS.index("yaw_rate")
 _WHEEL_SPEEDS = OUTPUTS[6:]
 
 # Columns of a law's memory: covariance of parameter and offset, and the offset itself
@@ -83,12 +94,16 @@ class ParameterLaw:
         filter_time: of the differentiating filter [s]; only `ACCELERATIONS` have one.
         least_wheel_speed: the law rests while vehicle or twin is slower [rad/s]: a car held by its
             brakes tells nothing of its mass.
+        largest_yaw_rate: the law rests while the measured one is larger [rad/s], TiL Eq. (24).
+        least_signal: the law rests while the instrument is smaller.
+        compensation: of the twin's signal, what it gets for each rad/s by which a wheel of the
+            vehicle is ahead of the twin's: gain on wheel speeds times I / (R M), see the module.
     """
 
     parameter: str
     signal: str
     instrument: Literal["measured", "twin"] = "twin"
-    form: Literal["sign", "least-squares"] = "least-squares"
+    form: Form = "least-squares"
     gain: float = 0.0
     scale: float = 1.0
     prior_sd: float = 1.0
@@ -100,6 +115,9 @@ class ParameterLaw:
     mode_damping: float = 0.5
     lag: float = 0.0
     least_wheel_speed: float = 0.0
+    largest_yaw_rate: float = math.inf
+    least_signal: float = 0.0
+    compensation: float = 0.0
 
     def __post_init__(self) -> None:
         """Checks names and numbers."""
@@ -107,18 +125,24 @@ class ParameterLaw:
             ("parameter", self.parameter, PARAMETERS),
             ("signal", self.signal, SIGNALS),
             ("instrument", self.instrument, ("measured", "twin")),
-            ("form", self.form, ("sign", "least-squares")),
+            ("form", self.form, get_args(Form)),
         ):
             if name not in allowed:
                 raise TwinError(f"law: {kind} is {name!r}; allowed: {', '.join(allowed)}")
         if self.scale == 0.0 or not math.isfinite(self.scale):
             raise TwinError(f"law: scale is {self.scale}; allowed: any number but 0")
+        if not math.isfinite(self.gain) or (self.gain < 0.0 and self.form != "integral"):
+            raise TwinError(f"law: gain is {self.gain}; allowed: 0 or more, finite")
         for name in (
-            *("gain", "drift", "offset_sd", "least_wheel_speed"),
-            *("mode_frequency", "mode_damping", "lag"),
+            *("drift", "offset_sd", "least_wheel_speed", "least_signal"),
+            *("mode_frequency", "mode_damping", "lag", "compensation"),
         ):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: 0 or more")
+        if not self.largest_yaw_rate > 0.0:
+            raise TwinError(
+                f"law: largest_yaw_rate is {self.largest_yaw_rate}; allowed: more than 0"
+            )
         for name in ("prior_sd", "noise_density", "filter_time"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
@@ -129,6 +153,13 @@ class ParameterLaw:
         return ACCELERATIONS.get(self.signal, self.signal)
 
 
+FORMS = get_args(Form)
+SIGN, _, INTEGRAL = range(len(FORMS))
+# Fields that compiled code takes as they are
+_COPIED = (
+    *("gain", "scale", "drift", "filter_time", "mode_damping"),
+    *("least_wheel_speed", "largest_yaw_rate", "least_signal", "compensation"),
+)
 # A law as compiled code sees it. A record goes into a function as one pointer; a tuple of arrays
 # would cost more than the law.
 LAW_DTYPE = np.dtype(
@@ -137,7 +168,7 @@ LAW_DTYPE = np.dtype(
         ("output", np.int64),
         ("differentiated", np.bool_),
         ("measured", np.bool_),
-        ("sign", np.bool_),
+        ("form", np.int64),  # place in `FORMS`
         ("gain", np.float64),
         ("scale", np.float64),
         ("intensity", np.float64),  # noise_density squared
@@ -147,6 +178,9 @@ LAW_DTYPE = np.dtype(
         ("mode_damping", np.float64),
         ("lag", np.int64),  # samples
         ("least_wheel_speed", np.float64),
+        ("largest_yaw_rate", np.float64),
+        ("least_signal", np.float64),
+        ("compensation", np.float64),
     ],
     align=True,
 )
@@ -173,13 +207,13 @@ def compile_laws(
         _check_names(law, outputs, parameters)
     table = np.zeros(len(laws), LAW_DTYPE)
     for row, law in zip(table, laws, strict=True):
-        for name in ("gain", "scale", "drift", "filter_time", "mode_damping", "least_wheel_speed"):
+        for name in _COPIED:
             row[name] = getattr(law, name)
         row["parameter"] = parameters.index(law.parameter)
         row["output"] = outputs.index(law.output)
         row["differentiated"] = law.signal in ACCELERATIONS
         row["measured"] = law.instrument == "measured"
-        row["sign"] = law.form == "sign"
+        row["form"] = FORMS.index(law.form)
         row["intensity"] = law.noise_density**2
         row["mode_frequency"] = 2.0 * math.pi * law.mode_frequency
         row["lag"] = round(law.lag / dt)
@@ -197,10 +231,16 @@ def _check_names(law: ParameterLaw, outputs: tuple[str, ...], parameters: tuple[
     ):
         if name not in allowed:
             raise TwinError(f"law: {kind} is {name!r}; this black box allows: {', '.join(allowed)}")
-    if law.least_wheel_speed > 0.0 and outputs[6:] != _WHEEL_SPEEDS:
+    for name in ("least_wheel_speed", "compensation"):
+        if getattr(law, name) > 0.0 and outputs[6:] != _WHEEL_SPEEDS:
+            raise TwinError(
+                f"law: {name} is {getattr(law, name)}; this black box, without wheel speeds, "
+                "allows: 0"
+            )
+    if law.largest_yaw_rate < math.inf and outputs[5:6] != ("yaw_rate",):
         raise TwinError(
-            f"law: least_wheel_speed is {law.least_wheel_speed}; this black box, without wheel "
-            "speeds, allows: 0"
+            f"law: largest_yaw_rate is {law.largest_yaw_rate}; this black box, without a yaw rate, "
+            "allows: inf"
         )
 
 
@@ -208,6 +248,19 @@ def _check_names(law: ParameterLaw, outputs: tuple[str, ...], parameters: tuple[
 def _moving(y, least):
     """Whether the mean of the wheel speeds is at least so much [rad/s]."""
     return y[6] + y[7] + y[8] + y[9] >= 4.0 * least
+
+
+@njit(cache=True)
+def _lead(y, twin_y):
+    """By how much the vehicle's wheels are ahead of the twin's, summed [rad/s].
+
+    A wheel speed that is not measured has not been corrected either.
+    """
+    lead = 0.0
+    for i in range(6, 10):
+        if not np.isnan(y[i]):
+            lead += y[i] - twin_y[i]
+    return lead
 
 
 @njit(cache=True)
@@ -224,6 +277,8 @@ def advance_law(law, memory, y, twin_y, dt):
     a, a_twin = y[law.output], twin_y[law.output]
     if np.isnan(a):
         return 0.0
+    if law.compensation > 0.0:
+        a_twin -= law.compensation * _lead(y, twin_y)
     if law.differentiated:
         if memory[BEGUN] == 0.0:
             memory[BEGUN] = 1.0
@@ -235,8 +290,14 @@ def advance_law(law, memory, y, twin_y, dt):
     least = law.least_wheel_speed
     if least > 0.0 and not (_moving(y, least) and _moving(twin_y, least)):
         return 0.0
-    if law.sign:
+    if abs(instrument) < law.least_signal:
+        return 0.0
+    if law.largest_yaw_rate < np.inf and not abs(y[_YAW_RATE]) <= law.largest_yaw_rate:
+        return 0.0
+    if law.form == SIGN:
         return law.gain * dt * np.sign(instrument) * (a_twin - a)
+    if law.form == INTEGRAL:
+        return law.gain * dt * (a - a_twin)
     noise, growth = law.intensity / dt, law.drift * law.drift * dt
     return _fit(memory, instrument / law.scale, a_twin - a, noise, growth)
 

@@ -25,6 +25,11 @@ from twin.kernel import correct, is_sound, read_states, set_parameters, step
 
 Array = NDArray[np.float64]
 
+# Gains c of an acceleration on its own speed have no unit: v' = (1 - c) a~ + c a + ... . As the
+# tyres' share of a~ falls with the speed it belongs to, it restores v for c < 1 and drives it away
+# for c > 1.
+FEED_THROUGH = {("vx", "ax"), ("vy", "ay")}
+
 
 class Gains(NamedTuple):
     """The linear law K (nx, ny), TiL Eq. (4), by its entries that are not zero."""
@@ -42,6 +47,7 @@ class Memory(NamedTuple):
     dx: Array  # (nx,) the last correction of the states
     p: Array  # (np,) the parameters in force
     laws: Array  # (n, m) memory of each parameter law
+    sample: NDArray[np.int64]  # (1,) samples since the last correction
 
 
 class Observer:
@@ -53,9 +59,11 @@ class Observer:
         laws: what corrects which load parameter.
         gains: entries of K by (state, output), for example
             `{("yaw_rate", "yaw_rate"): 5.0}` [1/s].
+        every: corrections are made at every so-manieth sample; the twin steps at each.
 
     Raises:
-        TwinError: a name that the twin does not have, or a gain that is not finite.
+        TwinError: a name that the twin does not have, a gain that is not finite, or a feed-through
+            of 1 or more, see `FEED_THROUGH`.
     """
 
     def __init__(
@@ -63,16 +71,23 @@ class Observer:
         twin: BlackBox,
         laws: Sequence[ParameterLaw],
         gains: Mapping[tuple[str, str], float] | None = None,
+        every: int = 1,
     ) -> None:
+        if every < 1:
+            raise TwinError(f"observer: every is {every}; allowed: 1 or more")
         self.twin = twin
+        self.dt = every * twin.dt  # between corrections [s]
+        self._every = every
+        self._needed = tuple(dict.fromkeys(law.output for law in laws))
         self._gains = _compile_gains(gains or {}, twin)
-        self._laws, memory = compile_laws(laws, twin.dt, twin.outputs, twin.parameters)
+        self._laws, memory = compile_laws(laws, self.dt, twin.outputs, twin.parameters)
         self._memory = Memory(
             u=np.zeros(len(twin.inputs)),
             y=np.zeros(len(twin.outputs)),
             dx=np.zeros(len(twin.states)),
             p=np.zeros(len(twin.parameters)),
             laws=memory,
+            sample=np.zeros(1, dtype=np.int64),
         )
         self._fresh = memory.copy()
 
@@ -87,6 +102,7 @@ class Observer:
         for name, value in (parameters or {}).items():
             p[_index(name, self.twin.parameters, "parameter")] = value
         self._memory.laws[:] = self._fresh
+        self._memory.sample[:] = 0
         self._memory.p[:] = self.twin.set_parameters(p)
         self.twin.reset(speed)
 
@@ -101,7 +117,7 @@ class Observer:
         _check_measurements(y[None], self.twin.outputs, "update")
         if isinstance(self.twin, Twin):
             check_inputs(self._memory.u[None], "update")
-            _update(self.twin.car, self._gains, self._laws, self._memory, y)
+            _update(self.twin.car, self._gains, self._laws, self._memory, y, self._every)
             self.twin.check()
         else:
             self._update_black_box(y)
@@ -111,8 +127,9 @@ class Observer:
         """Observes a whole drive, from the state that the observer is in.
 
         Raises:
-            TwinError: the drive has other channels or another sample time than the twin, a value is
-                not finite or out of range, or the twin has blown up.
+            TwinError: the drive has other channels or another sample time than the twin, lacks what
+                a law needs altogether, a value is not finite or out of range, or the twin has blown
+                up.
         """
         if (drive.input_names, drive.output_names) != (self.twin.inputs, self.twin.outputs):
             raise TwinError(
@@ -124,6 +141,9 @@ class Observer:
                 f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s"
             )
         _check_measurements(drive.measurements, self.twin.outputs, "drive")
+        for name in self._needed:
+            if np.isnan(drive.channel(name)).all():
+                raise TwinError(f"drive: has no measurement of {name}, which a law needs")
         if isinstance(self.twin, Twin):
             return self._run_compiled(self.twin, drive)
         return self._run_black_box(drive)
@@ -134,7 +154,7 @@ class Observer:
         states, parameters, outputs = _histories(twin, n)
         extended = np.empty((n, *twin.car.tyre_output.shape))
         done = _run(
-            twin.car, self._gains, self._laws, self._memory,
+            twin.car, self._gains, self._laws, self._memory, self._every,
             drive.inputs, drive.measurements, states, parameters, outputs, extended,
         )  # fmt: skip
         if done < n:
@@ -177,21 +197,30 @@ class Observer:
         """`_update`, its simulator called from Python."""
         twin, memory = self.twin, self._memory
         memory.y[:] = twin.step(memory.u)
+        memory.sample[0] += 1
+        if memory.sample[0] < self._every:
+            return
+        memory.sample[0] = 0
         if self._gains.gain.size:
-            _state_law(self._gains, memory, y, twin.dt)
+            _state_law(self._gains, memory, y, self.dt)
             twin.correct(memory.dx)
-        _parameter_laws(self._laws, memory, y, twin.dt)
+        _parameter_laws(self._laws, memory, y, self.dt)
         memory.p[:] = twin.set_parameters(memory.p)
 
 
 @njit(cache=True, nogil=True)
-def _update(car, gains, laws, memory, y):
+def _update(car, gains, laws, memory, y, every):
     """One sample of the observer, its inputs in memory.u."""
     step(car, memory.u, memory.y)
+    memory.sample[0] += 1
+    if memory.sample[0] < every:
+        return
+    memory.sample[0] = 0
+    dt = every * car.dt
     if gains.gain.size:
-        _state_law(gains, memory, y, car.dt)
+        _state_law(gains, memory, y, dt)
         correct(car, memory.dx)
-    _parameter_laws(laws, memory, y, car.dt)
+    _parameter_laws(laws, memory, y, dt)
     set_parameters(car, memory.p)
 
 
@@ -221,13 +250,13 @@ def _copy(source, target):
 
 @njit(cache=True, nogil=True)
 def _run(
-    car, gains, laws, memory, inputs, measurements, states, parameters, outputs, extended
+    car, gains, laws, memory, every, inputs, measurements, states, parameters, outputs, extended
 ):  # fmt: skip
     """All samples of a drive; returns how many were sound."""
     for k in range(inputs.shape[0]):
         read_states(car, states[k])
         _copy(inputs[k], memory.u)
-        _update(car, gains, laws, memory, measurements[k])
+        _update(car, gains, laws, memory, measurements[k], every)
         _copy(memory.p, parameters[k])
         _copy(memory.y, outputs[k])
         extended[k] = car.tyre_output
@@ -251,6 +280,11 @@ def _compile_gains(gains: Mapping[tuple[str, str], float], twin: BlackBox) -> Ga
         output.append(_index(of, twin.outputs, "output"))
         if not np.isfinite(gain):
             raise TwinError(f"gain {of} -> {to} is {gain}; allowed: finite numbers")
+        if (to, of) in FEED_THROUGH and not gain < 1.0:
+            raise TwinError(
+                f"gain {of} -> {to} is {gain}; allowed: less than 1, or the tyres' restoring forces "
+                "change their sign"
+            )
     return Gains(
         np.array(state, dtype=np.int64),
         np.array(output, dtype=np.int64),
