@@ -3,7 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.record import Manoeuvre
+from scenarios.circuit import circuit
+from scenarios.drivers import LIMITS
+from scenarios.lane_change import lane_change, stretch
+from scenarios.path import Piece, follow_on, path_of
+from scenarios.record import CourseManoeuvre, Manoeuvre
+from scenarios.speed_profile import GRAVITY, Course, Limits, course_of, times
 from twin.road import random_walk_heights
 
 Array = NDArray[np.float64]
@@ -106,3 +111,75 @@ def random_road(
         steering=np.zeros(n),
         road=random_walk_heights(rng, time, delay=wheelbase / speed),
     )
+
+
+def laps(
+    dt: float = 0.001,
+    duration: float | None = None,
+    *,
+    limits: Limits = LIMITS["sports_car"],
+    start: float = 20.0,
+    count: int = 2,
+) -> CourseManoeuvre:
+    """Laps of `scenarios.circuit` at the limits of a car, from a rolling start.
+
+    Args:
+        dt: sample time [s].
+        duration: [s]; what the laps take if None.
+        limits: of the car.
+        start: speed at the start [m/s].
+        count: of the laps, if there is no duration.
+    """
+    lap = circuit()
+    if duration is not None:  # no lap is faster than the fastest speed
+        count = 1 + int(duration * limits.speed / (lap.step * (lap.x.size - 1)))
+    # beyond the line the driver sees the next lap's first straight
+    course = course_of(follow_on([lap] * (count + 1)), limits, start=start)
+    seconds = duration or times(course)[count * (lap.x.size - 1)]
+    return _along("laps", course, dt, seconds)
+
+
+def lane_changes(
+    dt: float = 0.001,
+    duration: float | None = None,
+    *,
+    limits: Limits = LIMITS["sports_car"],
+    lateral: float = 1.0,
+    speeds: tuple[float, ...] = (25.0, 35.0, 30.0, 40.0, 22.0, 32.0),
+    braking: float = 2.5,
+    straight: float = 200.0,
+    start: float = 15.0,
+) -> CourseManoeuvre:
+    """Double lane changes in a row, as the driver brakes, and straights to speed up between them.
+
+    Each is the track of ISO 3888-1, stretched so that the entry speed takes the given lateral
+    acceleration. The driver brakes gently on the way through, hard behind it, down to half the
+    entry speed.
+
+    Args:
+        dt: sample time [s].
+        duration: [s]; what the speeds take if None, else they come round again.
+        limits: of the car.
+        lateral: acceleration on the way across [g].
+        speeds: on entering the lane changes [m/s].
+        braking: in the lane changes [m/s2].
+        straight: before each of them [m].
+        start: speed at the start [m/s].
+    """
+    rounds = 1 if duration is None else 1 + int(duration * max(speeds) / (straight * len(speeds)))
+    parts, ceilings = [], [np.full(1, np.inf)]
+    for speed in speeds * rounds + speeds[:1]:
+        stretched = stretch(speed, lateral * GRAVITY)
+        change, ahead = lane_change(stretched), path_of([Piece(straight, 0.0, 0.0)])
+        parts += [ahead, change]
+        slowing = np.maximum(speed**2 - 2.0 * braking * change.distance[1:], (0.6 * speed) ** 2)
+        ceilings += [np.full(ahead.x.size - 1, np.inf), np.sqrt(slowing)]
+        ceilings[-1][-1] = 0.5 * speed
+    course = course_of(follow_on(parts), limits, start=start, ceiling=np.concatenate(ceilings))
+    last = sum(part.x.size - 1 for part in parts[:-2])
+    return _along("lane changes", course, dt, duration or times(course)[last])
+
+
+def _along(name: str, course: Course, dt: float, seconds: float) -> CourseManoeuvre:
+    road = np.zeros((round(seconds / dt), 4))
+    return CourseManoeuvre(name=name, dt=dt, course=course, road=road)

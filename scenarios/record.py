@@ -1,12 +1,13 @@
 """Drives a simulated vehicle along a manoeuvre and records it as a `Drive`."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from scenarios.driver import CREEP, Driver, drive_along, new_memory, pedals, torques
+from scenarios.speed_profile import Course
 from twin import (
     INPUTS,
     LOAD,
@@ -25,26 +26,9 @@ from twin.kernel import is_sound, read_states, step
 Array = NDArray[np.float64]
 
 
-# Slower than this a driver who wants to stand still just holds the brake [m/s]; chosen.
-CREEP = 0.3
-
-
-class Driver(NamedTuple):
-    """A proportional-integral speed driver; forces are those at the road, of all wheels."""
-
-    proportional: float = 4000.0  # [N per m/s]
-    integral: float = 600.0  # [N per m]
-    largest_force: float = 9000.0  # [N], of the engine
-    pedal_rate: float = 20000.0  # [N/s]
-    wheel_radius: float = 0.36  # [m], turns force into torque
-    drive_front: float = 0.4  # share of the front axle
-    brake_front: float = 0.65
-    holding_torque: float = 500.0  # [N m] per wheel, at a standstill
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manoeuvre:
-    """What a driver is to do, sample by sample.
+    """What a driver is to do, sample by sample: an angle of the hand wheel over time.
 
     Attributes:
         name: of the manoeuvre.
@@ -61,8 +45,29 @@ class Manoeuvre:
     road: Array
 
 
-def record(vehicle: Vehicle, manoeuvre: Manoeuvre, driver: Driver = Driver()) -> Drive:  # noqa: B008
-    """Drives the vehicle and records inputs, noise-free measurements and the truth.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CourseManoeuvre:
+    """What a driver is to do, place by place: a path to follow, and how fast.
+
+    Attributes:
+        name: of the manoeuvre.
+        dt: sample time [s].
+        course: path and speeds; the car starts at its first point, along it.
+        road: (N, 4) height under each wheel [m].
+    """
+
+    name: str
+    dt: float
+    course: Course
+    road: Array
+
+
+def record(
+    vehicle: Vehicle,
+    manoeuvre: Manoeuvre | CourseManoeuvre,
+    driver: Driver = Driver(),  # noqa: B008
+) -> Drive:
+    """Drives the vehicle along a manoeuvre and records inputs, noise-free measurements and the truth.
 
     Truth holds every state by its name, sideslip [rad], the chassis' mass, CM and inertia, its
     scales (1: as in the files), each
@@ -74,14 +79,16 @@ def record(vehicle: Vehicle, manoeuvre: Manoeuvre, driver: Driver = Driver()) ->
     car = Twin(vehicle)
     if abs(manoeuvre.dt - car.dt) > 1e-9:
         raise TwinError(f"{manoeuvre.name}: sample time is {manoeuvre.dt} s, the car's {car.dt} s")
-    n = manoeuvre.speed.size
+    n = manoeuvre.road.shape[0]
     inputs, outputs, states = (np.empty((n, len(names))) for names in (INPUTS, OUTPUTS, STATES))
     tyres = np.empty((n, len(WHEELS), len(TYRE_OUTPUTS)))
-    car.reset(float(np.nan_to_num(manoeuvre.speed[0])), manoeuvre.road[0])
-    done = _follow(
-        car.car, driver, manoeuvre.speed, manoeuvre.steering, manoeuvre.road,
-        inputs, outputs, states, tyres,
-    )  # fmt: skip
+    records = inputs, outputs, states, tyres
+    if isinstance(manoeuvre, CourseManoeuvre):
+        car.reset(manoeuvre.course.speed[0], manoeuvre.road[0])
+        done = _follow(car.car, driver, manoeuvre.course, new_memory(), manoeuvre.road, *records)
+    else:
+        car.reset(float(np.nan_to_num(manoeuvre.speed[0])), manoeuvre.road[0])
+        done = _act(car.car, driver, manoeuvre.speed, manoeuvre.steering, manoeuvre.road, *records)
     if done < n:
         raise TwinError(f"{manoeuvre.name}: {vehicle.source} blew up at {done * car.dt:.3f} s")
     return Drive(
@@ -112,18 +119,20 @@ def _truth(vehicle: Vehicle, states: Array, outputs: Array, tyres: Array) -> dic
 
 
 @njit(cache=True, nogil=True)
-def _follow(car, driver, speed, steering, road, inputs, outputs, states, tyres):
-    """Drives all samples; returns how many were sound."""
+def _act(car, driver, speed, steering, road, inputs, outputs, states, tyres):
+    """Drives all samples by time; returns how many were sound."""
     integral, force = 0.0, 0.0
     for k in range(speed.size):
         read_states(car, states[k])
         inputs[k, 0] = steering[k]
         inputs[k, 9:13] = road[k]
-        integral, force = _pedals(driver, speed[k], states[k, 14], integral, force, car.dt)
+        integral, force = pedals(
+            driver, speed[k], 0.0, states[k, 14], integral, force, driver.largest_force, car.dt
+        )
         if speed[k] == 0.0 and states[k, 14] < CREEP:
             inputs[k, 1:5], inputs[k, 5:9] = 0.0, driver.holding_torque
         else:
-            _torques(driver, force, inputs[k])
+            torques(driver, force, inputs[k])
         step(car, inputs[k], outputs[k])
         tyres[k] = car.tyre_output
         if not is_sound(car):
@@ -131,27 +140,19 @@ def _follow(car, driver, speed, steering, road, inputs, outputs, states, tyres):
     return speed.size
 
 
-@njit(cache=True)
-def _pedals(driver, wanted, speed, integral, before, dt):
-    """The integral of the speed error [m] and the force wanted at the road [N], after a sample."""
-    if np.isnan(wanted):
-        integral, force = 0.0, 0.0
-    else:
-        error = wanted - speed
-        force = driver.proportional * error + driver.integral * integral
-        if abs(force) < driver.largest_force:
-            integral += error * dt
-    change = driver.pedal_rate * dt
-    force = min(max(force, before - change), before + change, driver.largest_force)
-    return integral, force
-
-
-@njit(cache=True)
-def _torques(driver, force, u):
-    """Fills the torques of one sample of inputs for a force at the road [N]."""
-    torque = 0.5 * driver.wheel_radius * force
-    drive, brake = max(torque, 0.0), max(-torque, 0.0)
-    u[1:3] = drive * driver.drive_front
-    u[3:5] = drive * (1.0 - driver.drive_front)
-    u[5:7] = brake * driver.brake_front
-    u[7:9] = brake * (1.0 - driver.brake_front)
+@njit(cache=True, nogil=True)
+def _follow(car, driver, course, memory, road, inputs, outputs, states, tyres):
+    """Drives all samples along a course; returns how many were sound."""
+    for k in range(road.shape[0]):
+        x = states[k]
+        read_states(car, x)
+        inputs[k, 9:13] = road[k]
+        drive_along(
+            driver, course, memory, x[0], x[1], x[5], x[14], x[15], x[19], x[24:28],
+            car.dt, inputs[k],
+        )  # fmt: skip
+        step(car, inputs[k], outputs[k])
+        tyres[k] = car.tyre_output
+        if not is_sound(car):
+            return k
+    return road.shape[0]
