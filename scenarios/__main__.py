@@ -233,6 +233,27 @@ def tune(
 
 
 @program.command()
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option(
+    "--map",
+    "map_path",
+    type=click.Path(path_type=Path),
+    metavar="MAP.toml",
+    help="Which channels of the log are ours.",
+)
+def inspect(log: Path, map_path: Path | None) -> None:
+    """Show what is in LOG (Parquet, CSV, MDF 4) and check its signs, units and delays."""
+    click.echo(catalogue.inspection()(log, map_path))
+
+
+@program.command("new-car")
+@click.argument("name")
+def new_car(name: str) -> None:
+    """Write NAME.toml, a commented description of a car to fill in."""
+    click.echo(f"{catalogue.new_car()(name)} describes a car: change what you know of yours.")
+
+
+@program.command()
 @json_option
 def bench(json_path: Path | None) -> None:
     """Measure the speed, as ratios taken side by side."""

@@ -144,3 +144,13 @@ def limits() -> Callable[[str, Scenario, Settings], tuple[Result, str]]:
 def bench() -> Callable[[], Result]:
     """What measures the speed."""
     return pkgutil.resolve_name("scenarios.bench:run")
+
+
+def inspection() -> Callable[[Path, Path | None], str]:
+    """What tells of a log, with a map or without, as text."""
+    return pkgutil.resolve_name("scenarios.inspect_log:inspect_log")
+
+
+def new_car() -> Callable[[str], Path]:
+    """What writes the description of a new car of that name, and returns its path."""
+    return pkgutil.resolve_name("twin.car_file:write_template")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from twin.channels import (
     EXTENDED,
+    FURTHER_OUTPUTS,
     INPUTS,
     LOAD,
     OUTPUTS,
@@ -38,6 +39,9 @@ _COMPILED = {
 
 __all__ = [
     "EXTENDED",
+=======
+    "FURTHER_OUTPUTS",
+>>>>>>> e3cdd9e (Read logs of other programs by a map: names, units, signs, delays; inspect them before anything is estimated)
     "INPUTS",
     "LOAD",
     "OUTPUTS",

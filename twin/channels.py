@@ -23,6 +23,13 @@ OUTPUTS = (
     *_wheels("wheel_speed"),
 )
 
+# What a log may carry behind OUTPUTS: speeds of the IMU [m/s], sideslip,
+# roll and pitch [rad], suspension travels [m], positive when the wheel moves up
+FURTHER_OUTPUTS = (
+    *("vx", "vy", "sideslip", "roll", "pitch"),
+    *_wheels("suspension_travel"),
+)
+
 STATES = (
     *("x", "y", "z"),  # of the IMU, in the world [m]
     *("roll", "pitch", "yaw"),  # [rad]

@@ -12,11 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import TwinError
+from twin.log_formats import format_of
+from twin.toml_file import reason
 
 FORMAT_VERSION = 1
-_METADATA_KEY = b"twin_drive"
 # Samples count as uniform when no step differs by more than this from the mean one, relatively.
 _UNIFORMITY = 1e-6
+
+
+class NoDrive(TwinError):
+    """A file that is sound but another program's log."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,8 +36,9 @@ class Drive:
         inputs: (N, nu) finite, C-contiguous.
         input_names: nu names, as in `twin.channels.INPUTS`.
         measurements: (N, ny) C-contiguous; NaN where a channel is missing.
-        output_names: ny names, as in `twin.channels.OUTPUTS`.
-        truth: of each name (N,), also of what is constant in time.
+        output_names: ny names, as in `twin.channels.OUTPUTS`; a log may carry `FURTHER_OUTPUTS`
+            behind them.
+        truth: of each name (N,), also of what is constant in time; NaN where it is not known.
         settings: what made the drive (scenario, seed, snr, versions, ...), kept as JSON keeps it.
 
     Raises:
@@ -115,48 +121,51 @@ class Drive:
         return dataclasses.replace(self, **changes)
 
     def save(self, path: str | Path) -> None:
-        """Writes the drive as Parquet, whole or not at all.
+        """Writes the drive as Parquet, CSV or MDF 4 (by the name's ending), whole or not at all.
 
         Columns are time, input.<name>, measurement.<name> and truth.<name>; settings and the
-        version of the format are JSON in the schema's metadata.
+        version of the format are JSON in the file's metadata, in CSV its first line.
 
         Raises:
-            TwinError: the file cannot be written.
+            TwinError: the file cannot be written, or its ending is unknown.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         path = Path(path)
         metadata = json.dumps({"version": FORMAT_VERSION, "settings": self.settings})
-        table = pa.table(dict(self._columns())).replace_schema_metadata({_METADATA_KEY: metadata})
+        write = format_of(path).write
         partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
         try:
-            pq.write_table(table, partial, write_page_checksum=True)
+            write(partial, dict(self._columns()), metadata)
             partial.replace(path)
         except OSError as error:
-            raise TwinError(f"{path}: cannot be written: {_reason(error)}") from error
+            raise TwinError(f"{path}: cannot be written: {reason(error)}") from error
         finally:
             partial.unlink(missing_ok=True)
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Reads what `save` wrote, to the bit.
+    def load(cls, path: str | Path, map: str | Path | None = None) -> "Drive":
+        """Reads what `save` wrote, to the bit, or a log of anybody by its map.
+
+        Args:
+            path: the file.
+            map: a TOML file, see `twin.log_map`; `twin.mapped_log` says what comes of it.
 
         Raises:
-            TwinError: the file is missing, broken, or no drive.
+            NoDrive: the file is another program's log, and there is no map.
+            TwinError: the file is missing or broken.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        path = Path(path)
+        if map is not None:
+            from twin.mapped_log import load_drive
 
+            return load_drive(path, map)
+        columns, metadata = format_of(path).read_columns(path)
+        if metadata is None:
+            raise NoDrive(
+                f"{path}: is {path.suffix[1:].capitalize()}, but no drive: it has no metadata "
+                "'twin_drive'; a log of another program needs a map"
+            )
         try:
-            with open(path, "rb") as file:
-                table = pq.read_table(file, page_checksum_verification=True)
-        except (OSError, pa.ArrowException) as error:
-            raise TwinError(f"{path}: cannot be read as Parquet: {_reason(error)}") from error
-        try:
-            settings = _settings((table.schema.metadata or {}).get(_METADATA_KEY))
-            _check_names(tuple(table.column_names))
-            columns = {name: _column(name, table[name]) for name in table.column_names}
+            settings = _settings(metadata)
             return cls(settings=settings, **_sorted_out(columns))
         except TwinError as error:
             raise TwinError(f"{path}: {error}") from error
@@ -223,23 +232,15 @@ def _as_json_keeps_it(settings: Mapping[str, Any]) -> dict[str, Any]:
         raise TwinError(f"drive: settings must be fit for JSON: {error}") from error
 
 
-def _settings(metadata: bytes | None) -> dict[str, Any]:
-    if metadata is None:
-        raise TwinError("is Parquet, but no drive: its schema has no metadata 'twin_drive'")
+def _settings(metadata: str) -> dict[str, Any]:
     try:
         content = json.loads(metadata)
         version, settings = content["version"], content["settings"]
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise TwinError("metadata 'twin_drive' must be JSON with version and settings") from error
     if version != FORMAT_VERSION:
         raise TwinError(f"is a drive of format {version!r}, must be {FORMAT_VERSION}")
     return settings
-
-
-def _column(name: str, column: Any) -> NDArray[np.float64]:
-    if str(column.type) != "double":
-        raise TwinError(f"column {name} is {column.type}, must be double")
-    return column.to_numpy()
 
 
 def _sorted_out(columns: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
@@ -268,9 +269,3 @@ def _sorted_out(columns: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
 
 def _matrix(columns: dict[str, NDArray[np.float64]], samples: int) -> NDArray[np.float64]:
     return np.column_stack(list(columns.values())) if columns else np.empty((samples, 0))
-
-
-def _reason(error: Exception) -> str:
-    """The first line of what an exception says, or its kind."""
-    text = getattr(error, "strerror", None) or str(error)
-    return text.splitlines()[0] if text else type(error).__name__
