@@ -39,9 +39,7 @@ _COMPILED = {
 
 __all__ = [
     "EXTENDED",
-=======
     "FURTHER_OUTPUTS",
->>>>>>> e3cdd9e (Read logs of other programs by a map: names, units, signs, delays; inspect them before anything is estimated)
     "INPUTS",
     "LOAD",
     "OUTPUTS",
