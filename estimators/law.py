@@ -14,7 +14,9 @@ mass, and a correction has the form
 * the *form*: "sign", z = sgn(.), with a constant gain as in the paper; or "least-squares", z = the
   signal itself with the gains of a recursive least-squares fit with forgetting: the Kalman filter
   of e = (a~ / scale) missing + offset + noise. The offset, a bias of the sensor or gravity seen by
-  a car that stands otherwise than its twin, is fitted along: it does not pull the parameter. The
+  a car that stands otherwise than its twin, is fitted along: it does not pull the parameter. Where
+  it may jump, a sensor that is knocked or a hill that begins, the residual's mean over 0.2 s tells,
+  which no change of the parameter could make as suddenly, and the offset is fitted anew. The
   form "integral", z = -1, is for a parameter that is itself a force: its gain has either sign.
 
 Laws may rest: at yaw rates beyond a gate (Eq. (24)), or where the instrument is too small to tell
@@ -67,8 +69,12 @@ _WHEEL_SPEEDS = OUTPUTS[6:]
 PP, PO, OO, OFFSET = range(4)
 # and of the differentiating filter: whether it has begun, its two stages for vehicle and for twin
 BEGUN, FILTER = 4, 5
-# of the mode's filter, position and speed; and the place in the ring of lagged instruments
-MODE, PLACE, RING = 9, 11, 12
+# of the mode's filter, position and speed; the residual's short mean, and whether it told of a jump
+# of the offset; and the place in the ring of lagged instruments
+MODE, MEAN, JUMPED, PLACE, RING = 9, 11, 12, 13, 14
+
+JUMP_TIME = 0.2  # [s] of the residual's short mean; chosen
+JUMP = 4.0  # standard deviations of it that are no noise; chosen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,6 +97,8 @@ class ParameterLaw:
             the root of Hz]: standard deviation times the root of the sample time.
         drift: of the least-squares form, of the parameter [unit over the root of s]: forgetting.
         offset_sd: of the least-squares form, of the signal's offset; zero: there is none.
+        offset_jump: of the least-squares form, the same after a jump of the offset, see the module;
+            zero: it does not jump.
         filter_time: of the differentiating filter [s]; only `ACCELERATIONS` have one.
         least_wheel_speed: the law rests while vehicle or twin is slower [rad/s]: a car held by its
             brakes tells nothing of its mass.
@@ -110,6 +118,7 @@ class ParameterLaw:
     noise_density: float = 1.0
     drift: float = 0.0
     offset_sd: float = 0.0
+    offset_jump: float = 0.0
     filter_time: float = 0.02
     mode_frequency: float = 0.0
     mode_damping: float = 0.5
@@ -134,7 +143,7 @@ class ParameterLaw:
         if not math.isfinite(self.gain) or (self.gain < 0.0 and self.form != "integral"):
             raise TwinError(f"law: gain is {self.gain}; allowed: 0 or more, finite")
         for name in (
-            *("drift", "offset_sd", "least_wheel_speed", "least_signal"),
+            *("drift", "offset_sd", "offset_jump", "least_wheel_speed", "least_signal"),
             *("mode_frequency", "mode_damping", "lag", "compensation"),
         ):
             if not 0.0 <= getattr(self, name) < math.inf:
@@ -154,10 +163,10 @@ class ParameterLaw:
 
 
 FORMS = get_args(Form)
-SIGN, _, INTEGRAL = range(len(FORMS))
+SIGN, LEAST_SQUARES, INTEGRAL = range(len(FORMS))
 # Fields that compiled code takes as they are
 _COPIED = (
-    *("gain", "scale", "drift", "filter_time", "mode_damping"),
+    *("gain", "scale", "drift", "offset_jump", "filter_time", "mode_damping"),
     *("least_wheel_speed", "largest_yaw_rate", "least_signal", "compensation"),
 )
 # A law as compiled code sees it. A record goes into a function as one pointer; a tuple of arrays
@@ -173,6 +182,7 @@ LAW_DTYPE = np.dtype(
         ("scale", np.float64),
         ("intensity", np.float64),  # noise_density squared
         ("drift", np.float64),
+        ("offset_jump", np.float64),
         ("filter_time", np.float64),
         ("mode_frequency", np.float64),  # [rad/s]
         ("mode_damping", np.float64),
@@ -298,6 +308,8 @@ def advance_law(law, memory, y, twin_y, dt):
         return law.gain * dt * np.sign(instrument) * (a_twin - a)
     if law.form == INTEGRAL:
         return law.gain * dt * (a - a_twin)
+    if law.offset_jump > 0.0:
+        _watch_offset(law, memory, instrument / law.scale, a_twin - a, dt)
     noise, growth = law.intensity / dt, law.drift * law.drift * dt
     return _fit(memory, instrument / law.scale, a_twin - a, noise, growth)
 
@@ -326,6 +338,19 @@ def _differentiate(memory, stage, value, filter_time, dt):
     change = decay * (memory[stage] - memory[stage + 1])
     memory[stage + 1] += change
     return change / dt
+
+
+@njit(cache=True)
+def _watch_offset(law, memory, regressor, innovation, dt):
+    """Opens the offset anew where the residual's short mean is more than noise and doubt allow."""
+    share = min(dt / JUMP_TIME, 1.0)
+    memory[MEAN] += share * (innovation - memory[OFFSET] - memory[MEAN])
+    doubt = memory[PP] * regressor**2 + 2.0 * memory[PO] * regressor + memory[OO]
+    memory[JUMPED] = 0.0
+    if memory[MEAN] ** 2 > JUMP**2 * (0.5 * law.intensity / JUMP_TIME + doubt):
+        memory[JUMPED] = 1.0
+        memory[OO] += law.offset_jump**2
+        memory[MEAN] = 0.0
 
 
 @njit(cache=True)

@@ -20,6 +20,7 @@ from twin.channels import (
 )
 from twin.contact import ROAD
 from twin.errors import TwinError
+from twin.fingerprint import fingerprint
 from twin.four_tyres import table_of
 from twin.scales import bars
 from twin.tyre import effective_radius
@@ -210,6 +211,10 @@ class Twin:
         mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
         self.car.tyre_state[:] = snapshot.tyre_state
         kernel.set_parameters(self.car, snapshot.parameters.copy())
+
+    def fingerprint(self) -> str:
+        """Hash of the vehicle: a snapshot belongs to twins of the same one."""
+        return fingerprint(self.vehicle)
 
     def check(self) -> None:
         """Raises TwinError once the simulation has blown up."""
