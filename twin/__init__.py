@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from twin.channels import (
     EXTENDED,
+    FORCES,
     INPUTS,
     LOAD,
     OUTPUTS,
@@ -38,6 +39,7 @@ _COMPILED = {
 
 __all__ = [
     "EXTENDED",
+    "FORCES",
     "INPUTS",
     "LOAD",
     "OUTPUTS",
