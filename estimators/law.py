@@ -15,7 +15,8 @@ mass, and a correction has the form
   signal itself with the gains of a recursive least-squares fit with forgetting: the Kalman filter
   of e = (a~ / scale) missing + offset + noise. The offset, a bias of the sensor or gravity seen by
   a car that stands otherwise than its twin, is fitted along: it does not pull the parameter. The
-  form "integral", z = -1, is for a parameter that is itself a force: its gain has either sign.
+  form "integral", z = -1, is for a parameter that is itself a force: its gain has either sign, and
+  what it has gathered may leak away again.
 
 Laws may rest: at yaw rates beyond a gate (Eq. (24)), or where the instrument is too small to tell
 anything but the errors of the model.
@@ -65,6 +66,7 @@ _WHEEL_SPEEDS = OUTPUTS[6:]
 
 # Columns of a law's memory: covariance of parameter and offset, and the offset itself
 PP, PO, OO, OFFSET = range(4)
+ADDED = OFFSET  # by a law of the integral form, all in all
 # and of the differentiating filter: whether it has begun, its two stages for vehicle and for twin
 BEGUN, FILTER = 4, 5
 # of the mode's filter, position and speed; and the place in the ring of lagged instruments
@@ -90,6 +92,7 @@ class ParameterLaw:
         noise_density: of the least-squares form, of the signal's noise [unit of the signal over
             the root of Hz]: standard deviation times the root of the sample time.
         drift: of the least-squares form, of the parameter [unit over the root of s]: forgetting.
+        leak: of the integral form, of what the law itself has added [1/s].
         offset_sd: of the least-squares form, of the signal's offset; zero: there is none.
         filter_time: of the differentiating filter [s]; only `ACCELERATIONS` have one.
         least_wheel_speed: the law rests while vehicle or twin is slower [rad/s]: a car held by its
@@ -109,6 +112,7 @@ class ParameterLaw:
     prior_sd: float = 1.0
     noise_density: float = 1.0
     drift: float = 0.0
+    leak: float = 0.0
     offset_sd: float = 0.0
     filter_time: float = 0.02
     mode_frequency: float = 0.0
@@ -134,7 +138,7 @@ class ParameterLaw:
         if not math.isfinite(self.gain) or (self.gain < 0.0 and self.form != "integral"):
             raise TwinError(f"law: gain is {self.gain}; allowed: 0 or more, finite")
         for name in (
-            *("drift", "offset_sd", "least_wheel_speed", "least_signal"),
+            *("drift", "leak", "offset_sd", "least_wheel_speed", "least_signal"),
             *("mode_frequency", "mode_damping", "lag", "compensation"),
         ):
             if not 0.0 <= getattr(self, name) < math.inf:
@@ -157,7 +161,7 @@ FORMS = get_args(Form)
 SIGN, _, INTEGRAL = range(len(FORMS))
 # Fields that compiled code takes as they are
 _COPIED = (
-    *("gain", "scale", "drift", "filter_time", "mode_damping"),
+    *("gain", "scale", "drift", "leak", "filter_time", "mode_damping"),
     *("least_wheel_speed", "largest_yaw_rate", "least_signal", "compensation"),
 )
 # A law as compiled code sees it. A record goes into a function as one pointer; a tuple of arrays
@@ -173,6 +177,7 @@ LAW_DTYPE = np.dtype(
         ("scale", np.float64),
         ("intensity", np.float64),  # noise_density squared
         ("drift", np.float64),
+        ("leak", np.float64),
         ("filter_time", np.float64),
         ("mode_frequency", np.float64),  # [rad/s]
         ("mode_damping", np.float64),
@@ -297,7 +302,9 @@ def advance_law(law, memory, y, twin_y, dt):
     if law.form == SIGN:
         return law.gain * dt * np.sign(instrument) * (a_twin - a)
     if law.form == INTEGRAL:
-        return law.gain * dt * (a - a_twin)
+        added = dt * (law.gain * (a - a_twin) - law.leak * memory[ADDED])
+        memory[ADDED] += added
+        return added
     noise, growth = law.intensity / dt, law.drift * law.drift * dt
     return _fit(memory, instrument / law.scale, a_twin - a, noise, growth)
 

@@ -32,6 +32,10 @@ STATE_BOUNDS = {
     "pitch_rate": (0.1, 300.0),  # K_wy-wy [1/s]
     "yaw_rate": (0.1, 300.0),  # K_wz-wz [1/s]
 }
+# One more entry of K, ours: the yaw rate's innovation on the lateral speed. With the yaw rate held to
+# its measurement, what is left of its innovation is the yaw moment that the twin's tyres lack, and
+# with it goes an error of the lateral speed.
+CROSS_BOUNDS = {"yaw_rate_vy": (1.0, 1000.0)}  # K_wz-vy [m/s2 per rad/s]
 LEAST_SQUARES_BOUNDS = {
     "noise_density": (3e-3, 3.0),  # [m/s2 per root of Hz]
     "drift": (1e-2, 30.0),  # [kg per root of s]
@@ -50,12 +54,14 @@ def state_gains(gains: Mapping[str, float]) -> dict[tuple[str, str], float]:
     """The entries of K, for `estimators.observer.Observer`.
 
     Args:
-        gains: a value for each of `STATE_BOUNDS`; others are left alone.
+        gains: a value for each of `STATE_BOUNDS`, and perhaps of `CROSS_BOUNDS`; others are left
+            alone.
     """
     own = ("pitch_rate", "yaw_rate")
     return {
         ("vx", "ax"): gains["ax_vx"],
         ("vy", "ay"): gains["ay_vy"],
+        ("vy", "yaw_rate"): gains.get("yaw_rate_vy", 0.0),
         **{(name, name): gains[name] for name in own},
         **{(f"wheel_speed_{w}", f"wheel_speed_{w}"): gains["wheel_speed"] for w in WHEELS},
     }
@@ -97,14 +103,26 @@ def mass_law(gains: Mapping[str, float], wheels: Wheels) -> ParameterLaw:
     )
 
 
-def axle_force_laws(bandwidth: float, mass: float, yaw_inertia: float, axles: tuple[float, float]):
+def axle_force_laws(
+    gains: Mapping[str, float],
+    bandwidth: float,
+    leak: float,
+    mass: float,
+    yaw_inertia: float,
+    axles: tuple[float, float],
+) -> tuple[ParameterLaw, ...]:
     """Corrections of the axles' lateral forces, as extended states.
 
-    The force that is missing, M (a_y - a~_y), and the moment, J_zz times the missing yaw
-    acceleration, are shared between the axles; what the twin still lacks decays at the bandwidth.
+    The force that is missing is M (a_y - a~_y). The moment is what the correction of the yaw rate
+    makes up for, J_zz K_wz (w_z - w~_z). Both are shared between the axles. Without a leak the twin
+    would take over all of it, its tyres would no longer hold its lateral speed, and the sideslip
+    would drift off as an integral of the sensors' errors. With the leak the twin takes over the
+    share bandwidth / (bandwidth + leak): one that must stay below 1, as a feed-through.
 
     Args:
+        gains: yaw_rate.
         bandwidth: [1/s].
+        leak: [1/s].
         mass: of the car [kg].
         yaw_inertia: of the car [kg m2].
         axles: x of the front and the rear axle, from the IMU [m].
@@ -114,11 +132,15 @@ def axle_force_laws(bandwidth: float, mass: float, yaw_inertia: float, axles: tu
     shares = {"front": -rear / wheelbase, "rear": front / wheelbase}
     return tuple(
         ParameterLaw(
-            parameter=f"axle_force_{axle}", signal=signal, form="integral", gain=bandwidth * gain
+            parameter=f"axle_force_{axle}",
+            signal=signal,
+            form="integral",
+            gain=bandwidth * gain,
+            leak=leak,
         )
         for axle, sign in (("front", 1.0), ("rear", -1.0))
         for signal, gain in (
             ("ay", mass * shares[axle]),
-            ("yaw_acceleration", sign * yaw_inertia / wheelbase),
+            ("yaw_rate", sign * gains["yaw_rate"] * yaw_inertia / wheelbase),
         )
     )

@@ -125,6 +125,12 @@ SCENARIOS = {
         "scenarios.roll_yaw:SCENARIO", "a swept steer tells the roll and yaw inertia"
     ),
     "pitch": Entry("scenarios.pitch:SCENARIO", "a rough road tells the pitch inertia"),
+    "laps": Entry(
+        "scenarios.laps:LAPS", "a sports car on a circuit: sideslip and mass at its limits"
+    ),
+    "lane-change": Entry(
+        "scenarios.laps:LANE_CHANGE", "double lane changes and braking: sideslip and mass"
+    ),
     "truck": Entry(
         f"{_TRUCK}:SCENARIO", "a truck's load changes twice: Kalman-Bucy filters beside TiL"
     ),
