@@ -43,9 +43,9 @@ class Driver(NamedTuple):
     wheelbase: float = 2.9  # [m]
     steering_ratio: float = 16.0  # hand wheel over road wheel
     understeer: float = 0.0013  # road-wheel angle over lateral acceleration [rad s2/m]
-    preview: float = 0.15  # how far ahead the bend and the pedals are taken [s]
+    preview: float = 0.2  # how far ahead the bend and the pedals are taken [s]
     look_ahead: float = 0.6  # [s]
-    yaw_gain: float = 0.05  # road-wheel angle over missing yaw rate [s]
+    yaw_gain: float = 0.08  # road-wheel angle over missing yaw rate [s]
     steering_rate: float = 15.0  # of the hand wheel [rad/s]
 
 
@@ -107,7 +107,7 @@ def at(values, position):
 @njit(cache=True, nogil=True)
 def _locate(course, memory, x, y, direction):
     """How far left of the course [m], and how far to the left of it the travel [rad]."""
-    left = 0.0
+    left, heading = 0.0, 0.0
     for _ in range(2):
         position = memory[0] / course.step
         heading = at(course.heading, position)

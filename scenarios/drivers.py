@@ -22,7 +22,7 @@ DRIVERS = {
         wheelbase=2.65,
         steering_ratio=13.0,
         understeer=0.0010,
-        look_ahead=0.5,
+        look_ahead=0.45,
     ),
     "bmw_320i": Driver(
         largest_force=6000.0,

@@ -15,8 +15,8 @@ OFFSET = 3.5
 # Width of entry, other and exit lane over that of the vehicle, to which comes 0.25 m
 WIDTHS = (1.1, 1.2, 1.3)
 MARGIN = 0.25
-# The curvature of the way across is at most so many times offset over length squared
-SHARPEST = 10.0 / np.sqrt(3.0)
+# The bend of the way across is at most so many times offset over length squared
+SHARPEST = 84.0 / (5.0 * np.sqrt(5.0))
 
 
 def stretch(speed: float, lateral: float) -> float:
@@ -32,6 +32,22 @@ def stretch(speed: float, lateral: float) -> float:
 def length(stretched: float = 1.0) -> float:
     """Of the whole lane change, along the lanes [m]."""
     return stretched * (ENTRY + ACROSS + OTHER + BACK + EXIT)
+
+
+def speeds_through(speed: float, path: Path) -> Array:
+    """(M,) at most along a lane change, for a driver who brakes on the way [m/s].
+
+    He enters with the given speed, brakes in the other lane so that the shorter way back takes no
+    more lateral acceleration than the way across, and brakes to half the speed behind it.
+
+    Args:
+        speed: on entering [m/s].
+        path: from `lane_change`.
+    """
+    sections = np.cumsum([0.0, ENTRY + ACROSS, OTHER, BACK, EXIT]) / length()
+    shares = np.array([1.0, 1.0, BACK / ACROSS, BACK / ACROSS, 0.5])
+    along = path.distance / path.distance[-1]
+    return speed * np.sqrt(np.interp(along, sections, shares**2))
 
 
 def lanes(width: float, stretched: float = 1.0) -> Array:
@@ -56,7 +72,7 @@ def lanes(width: float, stretched: float = 1.0) -> Array:
 
 
 def lane_change(stretched: float = 1.0, step: float = STEP) -> Path:
-    """The line of a driver through the lanes: straight in them, a polynomial of degree 5 between.
+    """The line of a driver through the lanes: straight in them, a polynomial of degree 7 between.
 
     Args:
         stretched: see `stretch`.
@@ -68,9 +84,9 @@ def lane_change(stretched: float = 1.0, step: float = STEP) -> Path:
     y, slope, bend = np.zeros((3, x.size))
     for sign, start, span in zip((1.0, -1.0), starts, spans, strict=True):
         u = np.clip((x - start) / span, 0.0, 1.0)
-        y += sign * OFFSET * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-        slope += sign * OFFSET / span * 30.0 * (u * (1.0 - u)) ** 2
-        bend += sign * OFFSET / span**2 * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
+        y += sign * OFFSET * u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
+        slope += sign * OFFSET / span * 140.0 * (u * (1.0 - u)) ** 3
+        bend += sign * OFFSET / span**2 * 420.0 * (u * (1.0 - u)) ** 2 * (1.0 - 2.0 * u)
     return _by_distance(x, y, slope, bend, step)
 
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from scenarios.circuit import circuit
 from scenarios.drivers import LIMITS
-from scenarios.lane_change import lane_change, stretch
+from scenarios.lane_change import lane_change, speeds_through, stretch
 from scenarios.path import Piece, follow_on, path_of
 from scenarios.record import CourseManoeuvre, Manoeuvre
 from scenarios.speed_profile import GRAVITY, Course, Limits, course_of, times
@@ -146,38 +146,36 @@ def lane_changes(
     limits: Limits = LIMITS["sports_car"],
     lateral: float = 1.0,
     speeds: tuple[float, ...] = (25.0, 35.0, 30.0, 40.0, 22.0, 32.0),
-    braking: float = 2.5,
-    straight: float = 200.0,
+    straight: float = 150.0,
     start: float = 15.0,
 ) -> CourseManoeuvre:
-    """Double lane changes in a row, as the driver brakes, and straights to speed up between them.
+    """Double lane changes with braking in a row, and straights to speed up between them.
 
-    Each is the track of ISO 3888-1, stretched so that the entry speed takes the given lateral
-    acceleration. The driver brakes gently on the way through, hard behind it, down to half the
-    entry speed.
+    What TiL Section 5 validates with; speeds are not given: chosen. Each is the track of ISO
+    3888-1, its lengths stretched so that the speed takes the given lateral acceleration.
 
     Args:
         dt: sample time [s].
         duration: [s]; what the speeds take if None, else they come round again.
         limits: of the car.
-        lateral: acceleration on the way across [g].
-        speeds: on entering the lane changes [m/s].
-        braking: in the lane changes [m/s2].
+        lateral: acceleration on the ways across and back [g].
+        speeds: on entering the lane changes, if the straights are long enough for them [m/s].
         straight: before each of them [m].
         start: speed at the start [m/s].
     """
     rounds = 1 if duration is None else 1 + int(duration * max(speeds) / (straight * len(speeds)))
     parts, ceilings = [], [np.full(1, np.inf)]
-    for speed in speeds * rounds + speeds[:1]:
-        stretched = stretch(speed, lateral * GRAVITY)
-        change, ahead = lane_change(stretched), path_of([Piece(straight, 0.0, 0.0)])
-        parts += [ahead, change]
-        slowing = np.maximum(speed**2 - 2.0 * braking * change.distance[1:], (0.6 * speed) ** 2)
-        ceilings += [np.full(ahead.x.size - 1, np.inf), np.sqrt(slowing)]
-        ceilings[-1][-1] = 0.5 * speed
+    for speed in speeds * rounds:
+        parts += [
+            path_of([Piece(straight, 0.0, 0.0)]),
+            lane_change(stretch(speed, lateral * GRAVITY)),
+        ]
+        ceilings += [np.full(parts[-2].x.size - 1, np.inf), speeds_through(speed, parts[-1])[1:]]
+    end = sum(part.x.size - 1 for part in parts)
+    parts.append(parts[0])  # the driver looks ahead
+    ceilings.append(ceilings[1])
     course = course_of(follow_on(parts), limits, start=start, ceiling=np.concatenate(ceilings))
-    last = sum(part.x.size - 1 for part in parts[:-2])
-    return _along("lane changes", course, dt, duration or times(course)[last])
+    return _along("lane changes", course, dt, duration or times(course)[end])
 
 
 def _along(name: str, course: Course, dt: float, seconds: float) -> CourseManoeuvre:

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEP = 0.5  # [m] between points; chosen: a car at 200 km/h passes eleven in a tenth of a second
-# Gauss-Legendre nodes and weights on 0 to 1: exact enough that the length of a circuit closes
-NODES, WEIGHTS = (0.5 * values + offset for values, offset in zip(
-    np.polynomial.legendre.leggauss(4), (0.5, 0.0), strict=True
-))  # fmt: skip
+# Gauss-Legendre nodes and weights on 0 to 1, order 8: a lap closes within a micrometre
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+NODES, WEIGHTS = 0.5 * NODES + 0.5, 0.5 * WEIGHTS
 
 
 class Path(NamedTuple):
@@ -27,7 +26,7 @@ class Path(NamedTuple):
     @property
     def distance(self) -> Array:
         """(M,) along the line [m]."""
-        return self.step * np.arange(self.x.size)
+        return np.arange(self.x.size, dtype=np.float64) * np.float64(self.step)
 
 
 class Piece(NamedTuple):
@@ -44,7 +43,7 @@ def path_of(pieces: Sequence[Piece], step: float = STEP) -> Path:
     Its last point is the last whole step; see `end_of` for the end.
     """
     ends = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
-    distance = step * np.arange(int(np.floor(ends[-1] / step + 1e-9)) + 1)
+    distance = np.float64(step) * np.arange(int(np.floor(ends[-1] / step + 1e-9)) + 1)
     nodes = np.union1d(distance, ends)  # so that no interval holds a corner of the curvature
     x, y = _positions(pieces, ends, nodes)
     at = np.searchsorted(nodes, distance)
@@ -64,10 +63,11 @@ def _positions(pieces: Sequence[Piece], ends: Array, nodes: Array) -> tuple[Arra
     lengths = np.diff(nodes)
     between = nodes[:-1, None] + lengths[:, None] * NODES
     heading = _bends(pieces, ends, between.ravel())[0].reshape(between.shape)
-    return tuple(
+    x, y = (
         np.concatenate([[0.0], np.cumsum(lengths * (direction(heading) @ WEIGHTS))])
         for direction in (np.cos, np.sin)
     )
+    return x, y
 
 
 def _bends(pieces: Sequence[Piece], ends: Array, distance: Array) -> tuple[Array, Array]:
@@ -86,12 +86,8 @@ def follow_on(paths: Sequence[Path]) -> Path:
 
     A path's last point and the next one's first are the same point.
     """
-    x, y, heading, curvature = (
-        [np.zeros(1)],
-        [np.zeros(1)],
-        [np.zeros(1)],
-        [paths[0].curvature[:1]],
-    )
+    x, y, heading = [np.zeros(1)], [np.zeros(1)], [np.zeros(1)]
+    curvature = [paths[0].curvature[:1]]
     for path in paths:
         turn = heading[-1][-1] - path.heading[0]
         c, s = np.cos(turn), np.sin(turn)

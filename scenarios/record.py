@@ -67,7 +67,7 @@ def record(
     manoeuvre: Manoeuvre | CourseManoeuvre,
     driver: Driver = Driver(),  # noqa: B008
 ) -> Drive:
-    """Drives the vehicle along a manoeuvre and records inputs, noise-free measurements and the truth.
+    """Drives a manoeuvre and records inputs, noise-free measurements and the truth.
 
     Truth holds every state by its name, sideslip [rad], the chassis' mass, CM and inertia, its
     scales (1: as in the files), each

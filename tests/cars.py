@@ -97,6 +97,19 @@ def variant(folder, *edits, tyre=()):
     return Vehicle.load(folder / "car.xml")
 
 
+FLIP = np.ones(28)
+FLIP[[Y, ROLL, YAW, VY, ROLL_RATE, YAW_RATE]] = -1.0
+SWAP = [1, 0, 3, 2]
+
+
+def mirrored(states):
+    """States of the mirror image: y, roll and yaw change sign, left and right wheels place."""
+    states = states * FLIP
+    for block in (TRAVEL, ANGLE, RATE, SPIN):
+        states[:, block : block + 4] = states[:, block : block + 4][:, SWAP]
+    return states
+
+
 def vertical_slides():
     """The edits that make the wheels travel along the body's z axis."""
     return ((r'(name="travel_\w\w" class="\w+" axis=)"[^"]*"', r'\1"0 0 1"'),)
@@ -113,6 +126,32 @@ def contact_points(twin, road=0.0):
         height = body.xpos[2] - np.broadcast_to(road, 4)[w]
         points[w] = body.xpos - height / upright[2] * upright
     return points
+
+
+def eigenvalues_of(twin):
+    """Those of the black box, by finite differences of single steps about its equilibrium."""
+    twin.reset()
+    start, u, size = twin.snapshot(), inputs(0.001), 1e-6
+
+    def acceleration(x):
+        twin.restore(start)
+        twin.correct(x)
+        before = twin.read_states()[VX:]
+        run(twin, u)
+        return (twin.read_states()[VX:] - before) / twin.dt
+
+    a = np.zeros((28, 28))
+    a[:VX, VX:] = np.eye(14)
+    for i, x in enumerate(size * np.eye(28)):
+        a[VX:, i] = (acceleration(x) - acceleration(-x)) / (2.0 * size)
+    return np.linalg.eigvals(a)
+
+
+def pairs(values):
+    """Frequency [Hz] and damping ratio of the oscillations, by frequency, (2, n)."""
+    values = values[values.imag > 1.0]
+    values = values[np.argsort(np.abs(values))]
+    return np.array([np.abs(values) / (2.0 * np.pi), -values.real / np.abs(values)])
 
 
 def drag(speed):

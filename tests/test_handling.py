@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from cars import (
     ALPHA,
-    ANGLE,
     CAMBER,
     FRONT,
     FX,
@@ -14,24 +13,22 @@ from cars import (
     MY,
     MZ,
     PLACES,
-    RATE,
     REAR,
     ROLL,
     ROLL_RATE,
     SPIN,
+    SWAP,
     TOTAL,
-    TRAVEL,
     VX,
     VY,
     WHEEL_INERTIA,
     WHEELBASE,
-    YAW,
     YAW_RATE,
     G,
     X,
-    Y,
     drag,
     inputs,
+    mirrored,
     run,
     suv,
     times,
@@ -181,19 +178,6 @@ def test_acceleration_on_the_straight_is_the_sum_of_forces_over_the_mass(torque)
 
 def loaded_radii(tyres):
     return 0.369 - tyres[:, FZ] / 260e3
-
-
-FLIP = np.ones(28)
-FLIP[[Y, ROLL, YAW, VY, ROLL_RATE, YAW_RATE]] = -1.0
-SWAP = [1, 0, 3, 2]
-
-
-def mirrored(states):
-    """States of the mirror image: y, roll and yaw change sign, left and right wheels place."""
-    states = states * FLIP
-    for block in (TRAVEL, ANGLE, RATE, SPIN):
-        states[:, block : block + 4] = states[:, block : block + 4][:, SWAP]
-    return states
 
 
 def test_mirrored_car_steered_the_other_way_drives_the_mirror_image(tmp_path):

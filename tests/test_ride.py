@@ -9,12 +9,11 @@ from cars import (
     PLACES,
     REAR,
     UNSPRUNG,
-    VX,
     WHEEL_INERTIA,
     WHEELBASE,
     G,
-    inputs,
-    run,
+    eigenvalues_of,
+    pairs,
     suv,
     variant,
     vertical_slides,
@@ -93,32 +92,6 @@ def eigenvalues_by_hand(axes):
     zero, one = np.zeros((7, 7)), np.eye(7)
     system = np.block([[zero, one], [-np.linalg.solve(m, k), -np.linalg.solve(m, c)]])
     return np.linalg.eigvals(system)
-
-
-def eigenvalues_of(twin):
-    """Those of the black box, by finite differences of single steps about its equilibrium."""
-    twin.reset()
-    start, u, size = twin.snapshot(), inputs(0.001), 1e-6
-
-    def acceleration(x):
-        twin.restore(start)
-        twin.correct(x)
-        before = twin.read_states()[VX:]
-        run(twin, u)
-        return (twin.read_states()[VX:] - before) / twin.dt
-
-    a = np.zeros((28, 28))
-    a[:VX, VX:] = np.eye(14)
-    for i, x in enumerate(size * np.eye(28)):
-        a[VX:, i] = (acceleration(x) - acceleration(-x)) / (2.0 * size)
-    return np.linalg.eigvals(a)
-
-
-def pairs(values):
-    """Frequency [Hz] and damping ratio of the oscillations, by frequency, (2, n)."""
-    values = values[values.imag > 1.0]
-    values = values[np.argsort(np.abs(values))]
-    return np.array([np.abs(values) / (2.0 * np.pi), -values.real / np.abs(values)])
 
 
 @pytest.mark.parametrize(("axes", "edits"), [(VERTICAL, vertical_slides()), (LEANING, ())])
