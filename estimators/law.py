@@ -17,7 +17,8 @@ mass, and a correction has the form
   a car that stands otherwise than its twin, is fitted along: it does not pull the parameter. Where
   it may jump, a sensor that is knocked or a hill that begins, the residual's mean over 0.2 s tells,
   which no change of the parameter could make as suddenly, and the offset is fitted anew. The
-  form "integral", z = -1, is for a parameter that is itself a force: its gain has either sign.
+  form "integral", z = -1, is for a parameter that is itself a force: its gain has either sign, and
+  what it has gathered may leak away again.
 
 Laws may rest: at yaw rates beyond a gate (Eq. (24)), or where the instrument is too small to tell
 anything but the errors of the model.
@@ -67,6 +68,7 @@ _WHEEL_SPEEDS = OUTPUTS[6:]
 
 # Columns of a law's memory: covariance of parameter and offset, and the offset itself
 PP, PO, OO, OFFSET = range(4)
+ADDED = OFFSET  # by a law of the integral form, all in all
 # and of the differentiating filter: whether it has begun, its two stages for vehicle and for twin
 BEGUN, FILTER = 4, 5
 # of the mode's filter, position and speed; the residual's short mean, and whether it told of a jump
@@ -96,6 +98,7 @@ class ParameterLaw:
         noise_density: of the least-squares form, of the signal's noise [unit of the signal over
             the root of Hz]: standard deviation times the root of the sample time.
         drift: of the least-squares form, of the parameter [unit over the root of s]: forgetting.
+        leak: of the integral form, of what the law itself has added [1/s].
         offset_sd: of the least-squares form, of the signal's offset; zero: there is none.
         offset_jump: of the least-squares form, the same after a jump of the offset, see the module;
             zero: it does not jump.
@@ -117,6 +120,7 @@ class ParameterLaw:
     prior_sd: float = 1.0
     noise_density: float = 1.0
     drift: float = 0.0
+    leak: float = 0.0
     offset_sd: float = 0.0
     offset_jump: float = 0.0
     filter_time: float = 0.02
@@ -143,7 +147,7 @@ class ParameterLaw:
         if not math.isfinite(self.gain) or (self.gain < 0.0 and self.form != "integral"):
             raise TwinError(f"law: gain is {self.gain}; allowed: 0 or more, finite")
         for name in (
-            *("drift", "offset_sd", "offset_jump", "least_wheel_speed", "least_signal"),
+            *("drift", "leak", "offset_sd", "offset_jump", "least_wheel_speed", "least_signal"),
             *("mode_frequency", "mode_damping", "lag", "compensation"),
         ):
             if not 0.0 <= getattr(self, name) < math.inf:
@@ -166,7 +170,7 @@ FORMS = get_args(Form)
 SIGN, LEAST_SQUARES, INTEGRAL = range(len(FORMS))
 # Fields that compiled code takes as they are
 _COPIED = (
-    *("gain", "scale", "drift", "offset_jump", "filter_time", "mode_damping"),
+    *("gain", "scale", "drift", "leak", "offset_jump", "filter_time", "mode_damping"),
     *("least_wheel_speed", "largest_yaw_rate", "least_signal", "compensation"),
 )
 # A law as compiled code sees it. A record goes into a function as one pointer; a tuple of arrays
@@ -182,6 +186,7 @@ LAW_DTYPE = np.dtype(
         ("scale", np.float64),
         ("intensity", np.float64),  # noise_density squared
         ("drift", np.float64),
+        ("leak", np.float64),
         ("offset_jump", np.float64),
         ("filter_time", np.float64),
         ("mode_frequency", np.float64),  # [rad/s]
@@ -307,7 +312,9 @@ def advance_law(law, memory, y, twin_y, dt):
     if law.form == SIGN:
         return law.gain * dt * np.sign(instrument) * (a_twin - a)
     if law.form == INTEGRAL:
-        return law.gain * dt * (a - a_twin)
+        added = dt * (law.gain * (a - a_twin) - law.leak * memory[ADDED])
+        memory[ADDED] += added
+        return added
     if law.offset_jump > 0.0:
         _watch_offset(law, memory, instrument / law.scale, a_twin - a, dt)
     noise, growth = law.intensity / dt, law.drift * law.drift * dt

@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from scenarios import catalogue
-from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Scenario, Settings
+from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Scenario, Settings, Tuning
 from scenarios.options import (
     STANDARD_OUTPUT,
     Name,
@@ -103,6 +103,12 @@ def list_() -> None:
 @click.option(
     "--rrd", type=OutputFile(suffix=".rrd"), metavar="FILE", help="Write the Rerun timeline."
 )
+@click.option(
+    "--gains",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Gains of the default estimator, as `til tune` writes them.",
+)
 @click.option("--view", is_flag=True, help="Show the timeline in a window until it is closed.")
 @dask_option
 @json_option
@@ -114,6 +120,7 @@ def run(
     jobs: int,
     duration: float | None,
     rrd: Path | None,
+    gains: Path | None,
     view: bool,
     dask: str | None,
     json_path: Path | None,
@@ -130,7 +137,10 @@ def run(
         seeds=tuple(range(seed, seed + seeds)),
         jobs=jobs,
         duration=duration,
+        gains=gains,
     )
+    if gains and not scenario.takes_gains:
+        raise Mistake(f"--gains: {name} takes none; allowed: laps, lane-change")
     with cluster(dask):
         result = scenario.run(settings)
     _report(result, json_path)
@@ -218,18 +228,41 @@ def limits(name: str, snr: float | None, duration: float | None, json_path: Path
 @click.option(
     "--out", type=OutputFile(suffix=".toml"), metavar="FILE", help="[default: out/tune-NAME.toml]"
 )
+@click.option(
+    "--bounds",
+    "bounds",
+    type=(str, float, float),
+    multiple=True,
+    metavar="GAIN LOW HIGH",
+    help="Look for a gain within other bounds than its own; may be given several times.",
+)
+@click.option("--cost", default="", help="What is minimised: robust or, where it has one, paper.")
 @json_option
 def tune(
-    name: str, estimator: str, evaluations: int, jobs: int, out: Path | None, json_path: Path | None
+    name: str,
+    estimator: str,
+    evaluations: int,
+    jobs: int,
+    out: Path | None,
+    bounds: Sequence[tuple[str, float, float]],
+    cost: str,
+    json_path: Path | None,
 ) -> None:
     """Choose the gains of an estimator of scenario NAME, on seeds that no result is reported on.
 
-    Bayesian optimisation; FILE holds the best point tried and the one predicted best.
+    Bayesian optimisation, in batches of four; FILE holds the best point tried and the one predicted
+    best. A tuning that was interrupted goes on from the journal beside FILE.
     """
-    path = out or Path("out", f"tune-{name}.toml")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    result = catalogue.scenario(name).tune(estimator, evaluations, jobs, path)
-    _report(result, json_path)
+    tuning = Tuning(
+        estimator=estimator,
+        evaluations=evaluations,
+        jobs=jobs,
+        path=out or Path("out", f"tune-{name}.toml"),
+        bounds={gain: (low, high) for gain, low, high in bounds},
+        cost=cost,
+    )
+    tuning.path.parent.mkdir(parents=True, exist_ok=True)
+    _report(catalogue.scenario(name).tune(tuning), json_path)
 
 
 @program.command()

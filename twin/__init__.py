@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from twin.channels import (
     EXTENDED,
+    FORCES,
     FURTHER_OUTPUTS,
     INPUTS,
     LOAD,
@@ -20,16 +21,21 @@ from twin.channels import (
 )
 from twin.drive import Drive
 from twin.errors import TwinError
+from twin.fmu_names import FmuNames
 from twin.load import PointMass, RigidBody, loaded, parameter_deltas
 from twin.noise import noise_sd, with_noise
 from twin.truck_parameters import TruckParameters
 
 if TYPE_CHECKING:
+    from twin.commonroad_twin import CommonRoadTwin
+    from twin.fmu_twin import FmuTwin
     from twin.truck_twin import TruckTwin
     from twin.twin import Snapshot, Twin, check_inputs
     from twin.vehicle import Vehicle
 
 _COMPILED = {
+    "CommonRoadTwin": "twin.commonroad_twin",
+    "FmuTwin": "twin.fmu_twin",
     "Snapshot": "twin.twin",
     "TruckTwin": "twin.truck_twin",
     "Twin": "twin.twin",
@@ -39,6 +45,7 @@ _COMPILED = {
 
 __all__ = [
     "EXTENDED",
+    "FORCES",
     "FURTHER_OUTPUTS",
     "INPUTS",
     "LOAD",
@@ -48,7 +55,10 @@ __all__ = [
     "STATES",
     "TYRE_OUTPUTS",
     "WHEELS",
+    "CommonRoadTwin",
     "Drive",
+    "FmuNames",
+    "FmuTwin",
     "PointMass",
     "RigidBody",
     "Snapshot",
