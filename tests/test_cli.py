@@ -297,3 +297,28 @@ sys.exit(cli.main(["run", "mass", "--seeds", "4", "--jobs", "2"]))
     os.killpg(run.pid, signal.SIGINT)
     _, err = run.communicate(timeout=30)
     assert (run.returncode, err) == (130, "til: interrupted\n")
+
+
+def test_new_car_is_written_once(til, tmp_path):
+    assert til("new-car", "mine") == (
+        0,
+        "mine.toml describes a car: change what you know of yours.\n",
+        "",
+    )
+    status, out, err = til("new-car", "mine")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "mine.toml: is there already" in err
+    assert "[chassis]" in (tmp_path / "mine.toml").read_text()
+
+
+def test_inspect_shows_a_log_and_names_a_missing_one(til, tmp_path):
+    (tmp_path / "log.csv").write_text("t,a [g]\n0,1\n1,2\n")
+    status, out, err = til("inspect", "log.csv")
+    assert (status, err) == (0, "")
+    assert "a [g]    g     1          2" in out
+    status, out, err = til("inspect", "none.csv")
+    assert (status, out, err) == (
+        2,
+        "",
+        "til: none.csv: cannot be read: No such file or directory\n",
+    )

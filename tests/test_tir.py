@@ -107,11 +107,11 @@ def test_model_without_fittyp_is_named_by_the_file_format(folder):
     assert "PROPERTY_FILE_FORMAT = 'FTIRE'" in refusal(folder(text))
 
 
-@pytest.mark.parametrize("model", ["61", "'MF-Swift'", "21"])
+@pytest.mark.parametrize("model", ["60", "'MF-SWIFT'", "21"])
 def test_other_models_are_named_in_the_error(folder, model):
     message = refusal(folder(changed("FITTYP", model)))
     assert model.strip("'") in message
-    assert "6, 52, PAC2002" in message
+    assert "6, 52, PAC2002 (all MF 5.2), 61, 62 (MF 6.1 and 6.2)" in message
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,12 @@
 """Logs and drives in ASAM MDF 4, by asammdf (extra `mdf`)."""
 
+import gc
+import sys
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +40,7 @@ def write(path: Path, columns: dict[str, Array], metadata: str) -> None:
             if name != "time"
         ]
         file.append(signals, common_timebase=True)
-        file.header.comment = _MARK + metadata
+        file.header.description = _MARK + metadata
         # asammdf puts its own ending on other names
         saved = file.save(path.with_name(path.name + ".mf4"), overwrite=True)
     saved.replace(path)
@@ -78,44 +83,53 @@ def read_log(path: Path, time: tuple[str | None, float | None]) -> RawLog:
 def _read(path: Path) -> tuple[RawLog, str]:
     check_mdf(path)
     asammdf = _asammdf(path)
+    fault = ""
+    # On a damaged file asammdf leaves a half-made object behind, whose end is noisy
+    noise, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         with asammdf.MDF(path) as file:
-            comment = file.header.comment
-            channels, text = _channels(file, asammdf)
-    except TwinError:
-        raise
-    except Exception as error:  # what asammdf raises on a damaged file is of every kind
-        raise TwinError(f"{path}: cannot be read as MDF: {reason(error)[:200]}") from error
+            comment = str(file.header.description)
+            channels, text = _channels(file)
+    except Exception as error:  # of every kind
+        fault = reason(error)[:200]
+    finally:
+        if fault:
+            gc.collect()
+        sys.unraisablehook = noise
+    if fault:
+        raise TwinError(f"{path}: cannot be read as MDF: {fault}")
     if not channels:
         raise TwinError(f"{path}: has no numeric channels; allowed: at least one")
     for name, channel in channels.items():
         check_time(path, f"time of {name[:40]!r}", channel.time)
-    return RawLog(path=path, channels=channels, text=text), str(comment)
+    return RawLog(path=path, channels=channels, text=text), comment
 
 
-def _channels(file, asammdf) -> tuple[dict[str, Channel], dict[str, str]]:
-    """The numeric channels; one whose name occurs again is called name.2, name.3, ..."""
+def _channels(file: Any) -> tuple[dict[str, Channel], dict[str, str]]:
+    """The numeric channels, and what else there is; a name's second occurrence gets a number."""
     channels: dict[str, Channel] = {}
     text: dict[str, str] = {}
+    count: Counter[str] = Counter()
     for group, index, name in _places(file):
-        count = sum(known == name or known.startswith(f"{name}.") for known in (*channels, *text))
-        unique = f"{name}.{count + 1}" if name in channels or name in text else name
+        count[name] += 1
+        unique = name if count[name] == 1 else f"{name}.{count[name]}"
         signal = file.get(group=group, index=index)
         values = np.asarray(signal.samples)
         if values.ndim != 1 or values.dtype.kind not in "iufb":
-            text[unique] = f"{values.dtype}"
-            continue
-        values = values.astype(np.float64)
-        if signal.invalidation_bits is not None:
-            values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
-        channels[unique] = Channel(
-            time=np.asarray(signal.timestamps, dtype=np.float64), values=values, unit=signal.unit
-        )
+            text[unique] = str(values.dtype)
+        elif values.size < 2:
+            text[unique] = "a single sample"
+        else:
+            values = values.astype(np.float64)
+            if signal.invalidation_bits is not None:
+                values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+            time = np.asarray(signal.timestamps, dtype=np.float64)
+            channels[unique] = Channel(time=time, values=values, unit=signal.unit)
     return channels, text
 
 
-def _places(file):
-    """Group, index and name of every channel that is no group's time."""
+def _places(file: Any) -> Iterator[tuple[int, int, str]]:
+    """Group, index and name of every channel with samples that is no group's time."""
     for group, content in enumerate(file.groups):
         master = file.masters_db.get(group)
         for index, channel in enumerate(content.channels):

@@ -22,6 +22,8 @@ NEEDS = {
     "Jxx": ("roll_rate", "steering_wheel_angle"),
     "Jyy": ("pitch_rate",),
     "Jzz": ("yaw_rate", "steering_wheel_angle"),
+    "tyre_friction": ("ay", "yaw_rate", "steering_wheel_angle", _SPEED),
+    "cornering_stiffness": ("ay", "yaw_rate", "steering_wheel_angle", _SPEED),
     "sideslip": ("ay", "yaw_rate", "steering_wheel_angle", _SPEED),
 }
 

@@ -1,4 +1,4 @@
-"""Reads tyre property files (.tir) of the Magic Formula MF 5.2, with PAC2002 coefficients.
+"""Reads tyre property files (.tir) of the Magic Formula MF 5.2 (PAC2002), 6.1 and 6.2.
 
 Sign convention, stated once: a file is in ISO-W (TYDEX W) axes, x forward, y left, z up, so that
 PKY1 < 0 and a positive slip angle gives a negative lateral force. That is the convention of this
@@ -12,6 +12,7 @@ from typing import NoReturn
 import numpy as np
 
 from twin.errors import TwinError
+from twin.tir_6 import EXTRA_SCALING, FIELDS, OPTIONAL, only_in_6, only_in_52, settle
 
 LARGEST_FILE = 1_000_000  # bytes; real files have some 20 kB
 
@@ -23,6 +24,7 @@ UNITS = {
     "TIME": ("SECOND", "SEC", "S"),
 }
 MODELS = ("6", "52", "PAC2002")  # names of MF 5.2 in the FITTYP of common files
+MODELS_6 = ("61", "62")
 SIDES = {"LEFT": 1.0, "RIGHT": -1.0}
 
 
@@ -60,7 +62,7 @@ RANGES = {
     "INCLINATION_ANGLE_RANGE": ("CAMMIN", "CAMMAX"),
     "VERTICAL_FORCE_RANGE": ("FZMIN", "FZMAX"),
 }
-SECTIONS = {"UNITS", "SCALING_COEFFICIENTS", *REQUIRED, *RANGES}
+SECTIONS = {"UNITS", "SCALING_COEFFICIENTS", *REQUIRED, *RANGES, *OPTIONAL, *only_in_6()}
 
 POSITIVE = (1e-3, 1e3)
 NOT_NEGATIVE = (0.0, 1e3)
@@ -78,17 +80,26 @@ LIMITS = {
     "VERTICAL_DAMPING": (0.0, 1e6),
     "FNOMIN": (1e1, 1e6),
 }
+LIMITS_6 = {
+    "PKY4": (0.1, 5.0),
+    **dict.fromkeys(_words("LONGITUDINAL_STIFFNESS LATERAL_STIFFNESS"), (1e3, 1e8)),
+    **dict.fromkeys(_words("INFLPRES NOMPRES"), (1e3, 1e7)),
+    "Q_RE0": (0.5, 1.5),
+    "QSY7": (-5.0, 5.0),
+    "QSY8": (-5.0, 5.0),
+}
 
 TYRE_DTYPE = np.dtype(
     [(key.lower(), np.float64) for keys in (*REQUIRED.values(), SCALING) for key in keys]
-    + [(name, np.float64) for name in ("side", "cammax", "fzmin", "fzmax")],
+    + [(name, np.float64) for name in ("side", "cammax", "fzmin", "fzmax", *FIELDS)],
     align=True,
 )
 """A tyre: the numbers of its file under their lower-case names, SI units, and
 
 * side: the side it was measured on, +1 left, -1 right;
 * cammax: largest inclination [rad] the coefficients hold for;
-* fzmin, fzmax: least and largest load [N] they hold for.
+* fzmin, fzmax: least and largest load [N] they hold for;
+* what only MF 6 has, see `twin.tir_6`.
 """
 
 Entries = dict[tuple[str, str], str]
@@ -108,21 +119,46 @@ def read_tyre(path: str | Path) -> np.void:
         code.
 
     Raises:
-        TwinError: the file cannot be read, or is no MF 5.2 tyre in SI units and ISO-W signs; the
-            message names the section, key, value and what is allowed.
+        TwinError: the file cannot be read, or is no tyre of these models in SI units and ISO-W
+            signs; the message names the section, key, value and what is allowed.
     """
     entries = _entries(path, _text(path))
     _check_units(path, entries)
-    _check_model(path, entries)
+    is_6 = _is_6(path, entries)
     tyre = np.zeros(1, TYRE_DTYPE)
+    left_out = only_in_52() if is_6 else ()
     for section, keys in REQUIRED.items():
         for key in keys:
-            tyre[key.lower()] = _number(path, entries, section, key)
+            if key not in left_out:
+                tyre[key.lower()] = _number(path, entries, section, key)
     for key in SCALING:
         tyre[key.lower()] = _number(path, entries, "SCALING_COEFFICIENTS", key, 1.0)
     tyre["side"] = _side(path, entries)
     _set_ranges(path, entries, tyre)
+    if is_6:
+        _complete_6(path, entries, tyre)
     return tyre[0]
+
+
+def _complete_6(path: str | Path, entries: Entries, tyre: np.ndarray) -> None:
+    """Adds what MF 6 has beyond MF 5.2, at the inflation pressure of the file."""
+    values: dict[str, float] = {}
+    for section, keys in only_in_6().items():
+        for key in keys:
+            values[key] = _number(path, entries, section, key, limits=LIMITS_6.get(key))
+    for section, defaults in OPTIONAL.items():
+        for key, default in defaults.items():
+            values[key] = _number(path, entries, section, key, default, LIMITS_6.get(key))
+    for key, default in EXTRA_SCALING.items():
+        values[key] = _number(path, entries, "SCALING_COEFFICIENTS", key, default)
+    if values["LMUV"] != 0.0:
+        _refuse(path, f"[SCALING_COEFFICIENTS] LMUV = {values['LMUV']:g}, only 0 is allowed")
+    settle(tyre, values)
+    for key in ("pkx1", "pdx1", "pdy1", "pky2", "vertical_stiffness", "longitudinal_stiffness"):
+        if not tyre[key] > 0.0:
+            _refuse(path, f"{key.upper()} at INFLPRES is {tyre[key][0]:g}, must be positive")
+    if not (tyre["pky1"] < 0.0 and tyre["lateral_stiffness"] > 0.0):
+        _refuse(path, "PKY1 at INFLPRES must be negative and LATERAL_STIFFNESS positive")
 
 
 def _text(path: str | Path) -> str:
@@ -178,16 +214,19 @@ def _check_units(path: str | Path, entries: Entries) -> None:
             _refuse(path, f"[UNITS] {key} = {unit[:40]!r}, only {allowed[0].lower()!r} is allowed")
 
 
-def _check_model(path: str | Path, entries: Entries) -> None:
+def _is_6(path: str | Path, entries: Entries) -> bool:
     """Checks FITTYP, or PROPERTY_FILE_FORMAT where a file (of Adams) has no FITTYP."""
     key = "FITTYP"
     if ("MODEL", key) not in entries and ("MODEL", "PROPERTY_FILE_FORMAT") in entries:
         key = "PROPERTY_FILE_FORMAT"
-    model = _word(path, entries, "MODEL", key)
-    if model.upper() not in MODELS:
+    model = _word(path, entries, "MODEL", key).upper()
+    if model not in (*MODELS, *MODELS_6):
         _refuse(
-            path, f"[MODEL] {key} = {model[:40]!r}, allowed are {', '.join(MODELS)} (all MF 5.2)"
+            path,
+            f"[MODEL] {key} = {model[:40]!r}, allowed are {', '.join(MODELS)} (all MF 5.2), "
+            f"{', '.join(MODELS_6)} (MF 6.1 and 6.2)",
         )
+    return model in MODELS_6
 
 
 def _side(path: str | Path, entries: Entries) -> float:

@@ -1,8 +1,11 @@
-"""The Magic Formula tyre, MF 5.2 (PAC2002): steady-state forces and moments, compiled.
+"""The Magic Formula tyre, MF 5.2 (PAC2002), 6.1 and 6.2: steady-state forces and moments, compiled.
 
-Equation numbers are those of Pacejka, *Tyre and Vehicle Dynamics*, 2nd ed., section 4.3.2, without
-turn slip and inflation pressure; where MF 5.2 has fewer coefficients than the book (stiffness and
-friction over camber) it is MF 5.2 that counts. Axes are ISO 8855, signs ISO-W: see `twin.tir`.
+Equation numbers are those of Pacejka, *Tyre and Vehicle Dynamics*, section 4.3.2, without turn
+slip: of the 2nd ed., where MF 5.2 has fewer coefficients than the book (stiffness and friction over
+camber) MF 5.2 counts; of the 3rd ed. for what is said of MF 6, see `twin.tir_6`. MF 5.2 has its
+further coefficients at 0; what differs beyond that is computed only if some tyre is of MF 6. Slip
+angle and inclination enter as such, not as tangent and sine (the book leaves the choice, 4.E3).
+Axes are ISO 8855, signs ISO-W: see `twin.tir`.
 
 Kept sane where the formula is extrapolated: outside its load range a tyre has the forces of the
 end of the range in proportion to the load; the inclination is limited to its range; curvatures
@@ -19,7 +22,7 @@ from typing import Any
 from numba import njit
 
 from twin.elementary import atan, clip, cos, exp, sin
-from twin.lanes import absolute, copysign, inlined, maximum, minimum, sqrt
+from twin.lanes import absolute, anywhere, copysign, inlined, maximum, minimum, sqrt, where
 
 Tyre = Any  # numpy.void, whose fields compiled code reads as attributes
 
@@ -72,12 +75,19 @@ def magic_formula(
     ky = _cornering_stiffness(tyre, fz, nominal, gamma)
     mu_y = _lateral_friction(tyre, dfz, gamma)
     fx0 = _pure_longitudinal(tyre, fz, dfz, kappa, gamma, kx)
-    shift_h, shift_v = _lateral_shifts(tyre, fz, dfz, gamma)
+    shift_h, shift_v = _lateral_shifts(tyre, fz, dfz, gamma, ky)
     fy0 = _pure_lateral(tyre, fz, dfz, alpha, gamma, ky, mu_y, shift_h, shift_v)
 
-    fx = _longitudinal_weight(tyre, dfz, kappa, alpha) * fx0
-    fy_weighted = _lateral_weight(tyre, dfz, kappa, alpha) * fy0  # F_y' of (4.E74)
+    fx = _longitudinal_weight(tyre, dfz, kappa, alpha, gamma) * fx0
+    weight = _lateral_weight(tyre, dfz, kappa, alpha, gamma)
+    fy_weighted = weight * fy0  # F_y' of (4.E74)
     fy = fy_weighted + _slip_induced_side_force(tyre, fz, dfz, kappa, alpha, gamma, mu_y)
+
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):  # MF 6: the force that the trail is an arm of is that of an upright wheel
+        fy_weighted = where(
+            is_6, weight * _upright_lateral(tyre, fz, dfz, nominal, alpha), fy_weighted
+        )
 
     trail = travel * _trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx / ky)
     residual = _residual_torque(
@@ -89,7 +99,7 @@ def magic_formula(
         share * fx,
         share * fy * side,
         share * _overturning_moment(tyre, fz, nominal, fy, gamma) * side,
-        -share * travel * _rolling_resistance(tyre, fz, nominal, fx, vx),
+        -share * travel * _rolling_resistance(tyre, fz, nominal, fx, vx, gamma),
         share * (-trail * fy_weighted + residual + arm * fx) * side,  # (4.E71), (4.E72)
     )
 
@@ -117,6 +127,7 @@ def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, floa
 
     PAC2002: sigma_kappa = F_z (p_Tx1 + p_Tx2 df_z) exp(p_Tx3 df_z) R_0/F_z0,
     sigma_alpha = p_Ty1 sin(2 arctan(F_z/(p_Ty2 F_z0))) (1 - p_Ky3 |gamma|) R_0, both scaled.
+    MF 6: slip stiffness over that of the carcass; Besselink et al. 2010, Eqs. (14)-(17).
 
     Args:
         tyre: the tyre's record.
@@ -124,13 +135,24 @@ def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, floa
         gamma: inclination [rad].
     """
     _, fz, dfz, nominal = _load(tyre, fz)
-    gamma = _inclination(tyre, gamma) * tyre.lgay
+    inclination = _inclination(tyre, gamma)
+    gamma = inclination * tyre.lgay
     along = fz * (tyre.ptx1 + tyre.ptx2 * dfz) * exp(tyre.ptx3 * dfz) / nominal
     across = tyre.pty1 * _sin_2_arctan(fz / (tyre.pty2 * nominal)) * tyre.lfzo
     across *= maximum(1.0 - tyre.pky3 * absolute(gamma), LEAST_SHARE)
+    along, across = along * tyre.unloaded_radius, across * tyre.unloaded_radius
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):
+        carcass_x = 1.0 + dfz * (tyre.pcfx1 + dfz * tyre.pcfx2)
+        carcass_y = 1.0 + dfz * (tyre.pcfy1 + dfz * tyre.pcfy2)
+        carcass_x = maximum(carcass_x, LEAST_SHARE) * tyre.longitudinal_stiffness
+        carcass_y = maximum(carcass_y, LEAST_SHARE) * tyre.lateral_stiffness
+        along = where(is_6, _slip_stiffness(tyre, fz, dfz) / carcass_x, along)
+        cornering = -_cornering_stiffness(tyre, fz, nominal, inclination)
+        across = where(is_6, cornering / carcass_y, across)
     return (
-        maximum(along * tyre.unloaded_radius * tyre.lsgkp, LEAST_RELAXATION),
-        maximum(across * tyre.unloaded_radius * tyre.lsgal, LEAST_RELAXATION),
+        maximum(along * tyre.lsgkp, LEAST_RELAXATION),
+        maximum(across * tyre.lsgal, LEAST_RELAXATION),
     )
 
 
@@ -147,7 +169,7 @@ def effective_radius(tyre: Tyre, fz: float) -> float:
     """
     deflection = clip(fz, 0.0, tyre.fzmax) / tyre.fnomin
     loss = tyre.dreff * atan(tyre.breff * deflection) + tyre.freff * deflection
-    radius = tyre.unloaded_radius - loss * tyre.fnomin / tyre.vertical_stiffness
+    radius = tyre.unloaded_radius + tyre.growth - loss * tyre.fnomin / tyre.vertical_stiffness
     return maximum(radius, 0.5 * tyre.unloaded_radius)
 
 
@@ -173,22 +195,35 @@ def _pure_lateral(tyre, fz, dfz, alpha, gamma, ky, mu, shift_h, shift_v):
     c = tyre.pcy1 * tyre.lcy
     d = mu * fz
     e = (tyre.pey1 + tyre.pey2 * dfz) * tyre.ley
-    e *= 1.0 - (tyre.pey3 + tyre.pey4 * gamma * tyre.lgay) * copysign(1.0, slip)
+    bent = (tyre.pey3 + tyre.pey4 * gamma * tyre.lgay) * copysign(1.0, slip)
+    e *= 1.0 + tyre.pey5 * gamma * gamma - bent
     b = ky / (c * d)
     return d * sin(c * _bend(b * slip, e)) + shift_v
 
 
 @inlined
-def _longitudinal_weight(tyre, dfz, kappa, alpha):
+def _upright_lateral(tyre, fz, dfz, nominal, alpha):
+    """Returns F_y0 [N] without inclination. (4.E32)."""
+    upright = 0.0 * alpha
+    ky = _cornering_stiffness(tyre, fz, nominal, upright)
+    mu = _lateral_friction(tyre, dfz, upright)
+    shift_h, shift_v = _lateral_shifts(tyre, fz, dfz, upright, ky)
+    return _pure_lateral(tyre, fz, dfz, alpha, upright, ky, mu, shift_h, shift_v)
+
+
+@inlined
+def _longitudinal_weight(tyre, dfz, kappa, alpha, gamma):
     """Returns G_xalpha, the share of F_x0 that side slip leaves. (4.E50)-(4.E57)."""
-    b = tyre.rbx1 * _cos_arctan(tyre.rbx2 * kappa) * tyre.lxal
+    b = tyre.rbx1 + tyre.rbx3 * gamma * gamma
+    b *= _cos_arctan(tyre.rbx2 * kappa) * tyre.lxal
     return _weight(b, tyre.rcx1, tyre.rex1 + tyre.rex2 * dfz, alpha, tyre.rhx1)
 
 
 @inlined
-def _lateral_weight(tyre, dfz, kappa, alpha):
+def _lateral_weight(tyre, dfz, kappa, alpha, gamma):
     """Returns G_ykappa, the share of F_y0 that longitudinal slip leaves. (4.E59)-(4.E65)."""
-    b = tyre.rby1 * _cos_arctan(tyre.rby2 * (alpha - tyre.rby3)) * tyre.lyka
+    b = tyre.rby1 + tyre.rby4 * gamma * gamma
+    b *= _cos_arctan(tyre.rby2 * (alpha - tyre.rby3)) * tyre.lyka
     shift = tyre.rhy1 + tyre.rhy2 * dfz
     return _weight(b, tyre.rcy1, tyre.rey1 + tyre.rey2 * dfz, kappa, shift)
 
@@ -246,7 +281,13 @@ def _slip_stiffness(tyre, fz, dfz):
 @inlined
 def _cornering_stiffness(tyre, fz, nominal, gamma):
     """Returns K_yalpha < 0 [N/rad]. (4.E25), in MF 5.2 with 1 - p_Ky3 |gamma|."""
-    upright = tyre.pky1 * nominal * _sin_2_arctan(fz / (tyre.pky2 * nominal)) * tyre.lky
+    rise = _sin_2_arctan(fz / (tyre.pky2 * nominal))
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):  # p_Ky4 for 2, and p_Ky5
+        at = maximum(tyre.pky2 + tyre.pky5 * gamma * gamma, LEAST_SHARE * tyre.pky2)
+        general = sin(tyre.pky4 * atan(fz / (at * nominal)))
+        rise = where(is_6, maximum(general, LEAST_SHARE * rise), rise)
+    upright = tyre.pky1 * nominal * rise * tyre.lky
     return upright * maximum(1.0 - tyre.pky3 * absolute(gamma * tyre.lgay), LEAST_SHARE)
 
 
@@ -259,12 +300,17 @@ def _lateral_friction(tyre, dfz, gamma):
 
 
 @inlined
-def _lateral_shifts(tyre, fz, dfz, gamma):
-    """Returns S_Hy [rad] and S_Vy [N]: ply steer, conicity, camber. (4.E27)-(4.E29)."""
+def _lateral_shifts(tyre, fz, dfz, gamma, ky):
+    """Returns S_Hy [rad] and S_Vy [N]: ply steer, conicity, camber. (4.E27)-(4.E30)."""
     inclination = gamma * tyre.lgay
     horizontal = (tyre.phy1 + tyre.phy2 * dfz) * tyre.lhy + tyre.phy3 * inclination
     vertical = (tyre.pvy1 + tyre.pvy2 * dfz) * tyre.lvy
-    vertical += (tyre.pvy3 + tyre.pvy4 * dfz) * inclination
+    thrust = (tyre.pvy3 + tyre.pvy4 * dfz) * inclination
+    vertical += thrust
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):  # camber stiffness K_ygamma0 = F_z (p_Ky6 + p_Ky7 df_z)
+        camber = (tyre.pky6 + tyre.pky7 * dfz) * gamma - thrust * tyre.lmuy
+        horizontal += where(is_6, fz * camber / ky, 0.0)
     return horizontal, fz * vertical * tyre.lmuy
 
 
@@ -297,7 +343,8 @@ def _residual_torque(tyre, fz, dfz, kappa, alpha, gamma, kx_over_ky, shift, by_c
     """Returns M_zr [N m] at combined slip. (4.E36)-(4.E38), (4.E45)-(4.E47), (4.E75)."""
     gamma = gamma * tyre.lgaz
     b = tyre.qbz9 * tyre.lky / tyre.lmuy + tyre.qbz10 * by_cy
-    d = (tyre.qdz6 + tyre.qdz7 * dfz) * tyre.lres + (tyre.qdz8 + tyre.qdz9 * dfz) * gamma
+    camber = tyre.qdz8 + tyre.qdz9 * dfz + (tyre.qdz10 + tyre.qdz11 * dfz) * absolute(gamma)
+    d = (tyre.qdz6 + tyre.qdz7 * dfz) * tyre.lres + camber * gamma
     d *= fz * tyre.unloaded_radius * tyre.lmuy
     slip = _equivalent_slip(alpha + shift, kappa, kx_over_ky)
     return d * _cos_arctan(b * slip) * cos(alpha)
@@ -326,13 +373,26 @@ def _force_arm(tyre, dfz, nominal, fy, gamma):
 @inlined
 def _overturning_moment(tyre, fz, nominal, fy, gamma):
     """Returns M_x [N m]. (4.E69)."""
-    share = tyre.qsx1 * tyre.lvmx + (tyre.qsx3 * fy / nominal - tyre.qsx2 * gamma) * tyre.lmx
+    side = fy / nominal
+    share = tyre.qsx1 * tyre.lvmx + (tyre.qsx3 * side - tyre.qsx2 * gamma) * tyre.lmx
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):  # q_Sx12 to q_Sx14: equation manual of MF-Tyre 6.1.2
+        load = fz / nominal
+        wave = sin(tyre.qsx7 * gamma + tyre.qsx8 * atan(tyre.qsx9 * side))
+        size = absolute(gamma)
+        more = tyre.qsx4 * cos(tyre.qsx5 * atan((tyre.qsx6 * load) * (tyre.qsx6 * load))) * wave
+        more += (tyre.qsx10 * atan(tyre.qsx11 * load) - tyre.qsx12 * size) * gamma
+        more += fy / fz * (tyre.qsx13 + tyre.qsx14 * size)
+        share += where(is_6, more * tyre.lmx, 0.0)
     return share * fz * tyre.unloaded_radius
 
 
 @inlined
-def _rolling_resistance(tyre, fz, nominal, fx, vx):
-    """Returns the size of M_y [N m], not negative. (4.E70), in MF 5.2 in steady state."""
+def _rolling_resistance(tyre, fz, nominal, fx, vx, gamma):
+    """Returns the size of M_y [N m], not negative. (4.E70), in MF 5.2 in steady state.
+
+    MF 6: (A48) of Besselink et al. 2010, in which the load counts by its power q_Sy7 only.
+    """
     speed = minimum(absolute(vx) / tyre.longvl, FASTEST)
     share = (
         tyre.qsy1
@@ -340,4 +400,20 @@ def _rolling_resistance(tyre, fz, nominal, fx, vx):
         + tyre.qsy3 * speed
         + tyre.qsy4 * (speed * speed) * (speed * speed)
     )
-    return maximum(share, 0.0) * fz * tyre.unloaded_radius * tyre.lmy
+    load = fz
+    is_6 = tyre.mf6 > 0.0
+    if anywhere(is_6):
+        tilted = (tyre.qsy5 + tyre.qsy6 * fz / nominal) * gamma * gamma
+        share += where(is_6, tilted, 0.0)
+        load = where(is_6, nominal * _power(fz / nominal, tyre.qsy7), fz)
+    return maximum(share, 0.0) * load * tyre.unloaded_radius * tyre.lmy
+
+
+@inlined
+def _power(x, exponent):
+    """Returns x^exponent for x from 0.001 to 1000, its logarithm by Halley's method."""
+    logarithm = 2.0 * (x - 1.0) / (x + 1.0)
+    for _ in range(6):
+        reached = exp(logarithm)
+        logarithm += 2.0 * (x - reached) / (x + reached)
+    return exp(exponent * logarithm)

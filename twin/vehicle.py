@@ -1,4 +1,4 @@
-"""A vehicle: an MJCF file with its steering, aerodynamics, tyres and loads, checked at the door."""
+"""A vehicle: an MJCF or TOML file with its steering, aerodynamics, tyres and loads, checked."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -8,9 +8,11 @@ import mujoco
 import numpy as np
 
 import models
+from twin.car_file import car_spec, car_tyres
 from twin.channels import WHEELS
 from twin.errors import TwinError
 from twin.load import PointMass, RigidBody
+from twin.mjcf_file import read_mjcf, tyre_path
 from twin.scales import LARGEST_SCALE, LEAST_SCALE, VEHICLE_SCALES, scale_model, scale_tyres
 from twin.tir import read_tyre
 
@@ -35,7 +37,7 @@ class Vehicle:
     """A car by its files, and what it carries. It can be pickled; a `Twin` of it cannot.
 
     Attributes:
-        source: the MJCF file.
+        source: the MJCF file, or the TOML file of `twin.car_fields`.
         loads: point masses fixed to the chassis as bodies of their own.
         scales: what differs from the files by a factor, see `scaled`.
     """
@@ -46,7 +48,7 @@ class Vehicle:
 
     @classmethod
     def load(cls, name: str | Path) -> "Vehicle":
-        """A car of the project by its name ("suv"), or of any MJCF file by its path.
+        """A car of the project by its name ("suv"), or of any MJCF or TOML file by its path.
 
         Raises:
             TwinError: no such file, or one that does not describe a car; the message says why.
@@ -88,12 +90,10 @@ class Vehicle:
         """
         if not self.source.is_file():
             raise TwinError(
-                f"{self.source}: no such vehicle file; give an MJCF file or a car's name"
+                f"{self.source}: no such vehicle file; give an MJCF or TOML file or a car's name"
             )
-        try:
-            spec = mujoco.MjSpec.from_file(str(self.source))
-        except (ValueError, mujoco.FatalError) as error:
-            raise TwinError(f"{self.source}: {' '.join(str(error).split())}") from None
+        is_toml = self.source.suffix == ".toml"
+        spec = car_spec(self.source) if is_toml else read_mjcf(self.source)
         for load in self.loads:
             body = spec.body("chassis").add_body(name=load.name, pos=load.position)
             body.ipos = np.zeros(3)
@@ -171,14 +171,11 @@ class Vehicle:
         Raises:
             TwinError: a .tir file is missing or broken.
         """
-        model = self.compile()
-        read = []
-        for axle in ("tyre_front", "tyre_rear"):
-            text = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, axle)
-            start = model.text_adr[text]
-            name = model.text_data[start : start + model.text_size[text] - 1].decode()
-            beside = self.source.parent / name
-            read.append(read_tyre(beside if beside.is_file() else models.path(name)))
+        if self.source.suffix == ".toml":
+            read = car_tyres(self.source)
+        else:
+            texts = _texts(self.compile(), "tyre_front", "tyre_rear")
+            read = [read_tyre(tyre_path(self.source, name)) for name in texts]
         tyres = np.array([read[0], read[0], read[1], read[1]], dtype=read[0].dtype)
         scale_tyres(tyres, dict(self.scales))
         return tyres
@@ -201,3 +198,13 @@ class Vehicle:
             inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
             inertia += mass * (place @ place * np.eye(3) - np.outer(place, place))
         return RigidBody(mass=float(masses.sum()), cm=cm, inertia=inertia)
+
+
+def _texts(model: mujoco.MjModel, *names: str) -> list[str]:
+    """Texts of <custom> by their names."""
+    texts = []
+    for name in names:
+        text = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, name)
+        start = model.text_adr[text]
+        texts.append(model.text_data[start : start + model.text_size[text] - 1].decode())
+    return texts
