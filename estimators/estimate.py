@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin import OUTPUTS, PARAMETERS, STATES, TwinError
+from twin import EXTENDED, OUTPUTS, PARAMETERS, STATES, TwinError
 
 Array = NDArray[np.float64]
 
@@ -19,25 +19,30 @@ class Estimate:
         states: (N, nx) of the twin before each sample's correction.
         parameters: (N, np) deltas from the nominal chassis after it.
         outputs: (N, ny) what the twin's sensors showed.
+        extended: (N, ne) what else the twin computed: forces and slips of its tyres.
         nominal: (np,) the twin's own chassis, without deltas; NaN where a black box does not tell.
-        state_names, parameter_names, output_names: of the columns; by default those of a car.
+        state_names, parameter_names, output_names, extended_names: of the columns; by default
+            those of a car.
     """
 
     time: Array
     states: Array
     parameters: Array
     outputs: Array
+    extended: Array
     nominal: Array
     state_names: tuple[str, ...] = STATES
     parameter_names: tuple[str, ...] = PARAMETERS
     output_names: tuple[str, ...] = OUTPUTS
+    extended_names: tuple[str, ...] = EXTENDED
 
     def __getitem__(self, name: str) -> Array:
-        """The (N,) history of a parameter, as a delta, or of a state or output of the twin."""
+        """The (N,) history of a parameter, as a delta, or of anything else of the twin."""
         tables = (
             (self.parameter_names, self.parameters),
             (self.state_names, self.states),
             (self.output_names, self.outputs),
+            (self.extended_names, self.extended),
         )
         for names, table in tables:
             if name in names:

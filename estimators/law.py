@@ -217,11 +217,13 @@ def advance_law(law, memory, y, twin_y, dt):
     Args:
         law: a record of `LAW_DTYPE`.
         memory: the law's own.
-        y: (ny,) measurements.
+        y: (ny,) measurements; NaN is none, and corrects nothing.
         twin_y: (ny,) outputs of the twin.
         dt: sample time [s].
     """
     a, a_twin = y[law.output], twin_y[law.output]
+    if np.isnan(a):
+        return 0.0
     if law.differentiated:
         if memory[BEGUN] == 0.0:
             memory[BEGUN] = 1.0

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.observer import Observer
-from twin import PARAMETERS, Drive, Twin, TwinError
+from twin import PARAMETERS, SCALES, Drive, Twin, TwinError
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,7 @@ OFFSETS = {
     **dict.fromkeys(("cm_x", "cm_y", "cm_z"), 0.005),
     **{"Jxx": 10.0, "Jyy": 30.0, "Jzz": 30.0},
     **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 10.0),
+    **dict.fromkeys(SCALES, 0.01),
 }
 
 # Differences are good to some 1e-4 of a sensitivity. Of scaled information, less than the square of

@@ -132,9 +132,10 @@ class Observer:
         check_inputs(drive.inputs, "drive")
         n = len(drive)
         states, parameters, outputs = _histories(twin, n)
+        extended = np.empty((n, *twin.car.tyre_output.shape))
         done = _run(
             twin.car, self._gains, self._laws, self._memory,
-            drive.inputs, drive.measurements, states, parameters, outputs,
+            drive.inputs, drive.measurements, states, parameters, outputs, extended,
         )  # fmt: skip
         if done < n:
             raise TwinError(
@@ -146,6 +147,7 @@ class Observer:
             states=states,
             parameters=parameters,
             outputs=outputs,
+            extended=extended.reshape(n, -1),
             nominal=twin.car.nominal.copy(),
         )
 
@@ -163,10 +165,12 @@ class Observer:
             states=states,
             parameters=parameters,
             outputs=outputs,
+            extended=np.empty((len(drive), 0)),
             nominal=np.full(len(twin.parameters), np.nan),
             state_names=twin.states,
             parameter_names=twin.parameters,
             output_names=twin.outputs,
+            extended_names=(),
         )
 
     def _update_black_box(self, y: Array) -> None:
@@ -193,11 +197,12 @@ def _update(car, gains, laws, memory, y):
 
 @njit(cache=True, nogil=True)
 def _state_law(gains, memory, y, dt):
-    """Fills memory.dx with the correction of the states: TiL Eq. (4)."""
+    """Fills memory.dx with the correction of the states: TiL Eq. (4); NaN corrects nothing."""
     memory.dx[:] = 0.0
     for k in range(gains.gain.size):
         j = gains.output[k]
-        memory.dx[gains.state[k]] += gains.gain[k] * dt * (y[j] - memory.y[j])
+        if not np.isnan(y[j]):
+            memory.dx[gains.state[k]] += gains.gain[k] * dt * (y[j] - memory.y[j])
 
 
 @njit(cache=True, nogil=True)
@@ -215,7 +220,9 @@ def _copy(source, target):
 
 
 @njit(cache=True, nogil=True)
-def _run(car, gains, laws, memory, inputs, measurements, states, parameters, outputs):
+def _run(
+    car, gains, laws, memory, inputs, measurements, states, parameters, outputs, extended
+):  # fmt: skip
     """All samples of a drive; returns how many were sound."""
     for k in range(inputs.shape[0]):
         read_states(car, states[k])
@@ -223,6 +230,7 @@ def _run(car, gains, laws, memory, inputs, measurements, states, parameters, out
         _update(car, gains, laws, memory, measurements[k])
         _copy(memory.p, parameters[k])
         _copy(memory.y, outputs[k])
+        extended[k] = car.tyre_output
         if not is_sound(car):
             return k
     return inputs.shape[0]
@@ -259,8 +267,9 @@ def _index(name: str, names: tuple[str, ...], kind: str) -> int:
 def _check_measurements(y: Array, names: tuple[str, ...], what: str) -> None:
     if y.shape[1:] != (len(names),):
         raise TwinError(f"{what}: measurements have shape {y.shape}; allowed: (n, {len(names)})")
-    if not np.isfinite(y).all():
-        row, column = np.argwhere(~np.isfinite(y))[0]
+    if np.isinf(y).any():
+        row, column = np.argwhere(np.isinf(y))[0]
         raise TwinError(
-            f"{what}: {names[column]} is {y[row, column]} in sample {row}; allowed: finite numbers"
+            f"{what}: {names[column]} is {y[row, column]} in sample {row}; allowed: finite "
+            "numbers, and NaN where there is no measurement"
         )

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from twin import (
     INPUTS,
+    LOAD,
     OUTPUTS,
-    PARAMETERS,
+    SCALES,
     STATES,
     TYRE_OUTPUTS,
     WHEELS,
@@ -63,7 +64,8 @@ class Manoeuvre:
 def record(vehicle: Vehicle, manoeuvre: Manoeuvre, driver: Driver = Driver()) -> Drive:  # noqa: B008
     """Drives the vehicle and records inputs, noise-free measurements and the truth.
 
-    Truth holds every state by its name, sideslip [rad], the chassis' mass, CM and inertia, each
+    Truth holds every state by its name, sideslip [rad], the chassis' mass, CM and inertia, its
+    scales (1: as in the files), each
     tyre's forces, moments and slips (`fx_fl` ...) and the noise-free outputs that are no state.
 
     Raises:
@@ -100,9 +102,10 @@ def _truth(vehicle: Vehicle, states: Array, outputs: Array, tyres: Array) -> dic
     body = vehicle.chassis()
     values = (body.mass, *body.cm, *np.diag(body.inertia), *body.inertia[[0, 0, 1], [1, 2, 2]])
     truth |= {
-        name: np.full(states.shape[0], value)
-        for name, value in zip(PARAMETERS, values, strict=True)
+        name: np.full(states.shape[0], value) for name, value in zip(LOAD, values, strict=True)
     }
+    scales = dict(vehicle.scales)
+    truth |= {name: np.full(states.shape[0], scales.get(name, 1.0)) for name in SCALES}
     for w, wheel in enumerate(WHEELS):
         truth |= {f"{name}_{wheel}": tyres[:, w, i] for i, name in enumerate(TYRE_OUTPUTS)}
     return truth

@@ -38,6 +38,8 @@ _SIGNAL = {
     **{"mass": "ax", "cm_x": "yaw_rate", "cm_y": "roll_rate", "cm_z": "roll_rate"},
     **{"Jxx": "roll_rate", "Jyy": "pitch_rate", "Jzz": "yaw_rate"},
     **{"Jxy": "pitch_rate", "Jxz": "yaw_rate", "Jyz": "pitch_rate"},
+    **{"tyre_friction": "ay", "cornering_stiffness": "ay", "drag": "ax"},
+    **{"spring": "roll_rate", "damper": "roll_rate"},
 }
 
 
@@ -190,7 +192,7 @@ def _parameter_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
             Line("truth", "truth", truth, TRUTH, 2.0),
         ]
     lines.append(Line("estimate", "estimate", estimate[name], TWIN, 2.5))
-    unit = {"m": "kg", "c": "m", "J": "kg m²"}[name[0]]
+    unit = "1" if name in twin.SCALES else {"m": "kg", "c": "m", "J": "kg m²"}[name[0]]
     return Plot(f"parameters/{name}", f"{name}: change from nominal [{unit}]", lines)
 
 

@@ -167,12 +167,22 @@ def test_observer_refuses_gains_it_cannot_use(gains, message):
 
 def test_measurement_that_is_no_number_is_named(drive):
     bad = drive.measurements.copy()
-    bad[17, OUTPUTS.index("yaw_rate")] = np.nan
+    bad[17, OUTPUTS.index("yaw_rate")] = np.inf
     til = observer(TIL)
-    with pytest.raises(TwinError, match="drive: yaw_rate is nan in sample 17"):
+    with pytest.raises(TwinError, match="drive: yaw_rate is inf in sample 17"):
         til.run(drive.replace(measurements=bad))
-    with pytest.raises(TwinError, match="update: yaw_rate is nan"):
+    with pytest.raises(TwinError, match="update: yaw_rate is inf"):
         til.update(drive.inputs[17], bad[17])
+
+
+def test_measurement_that_is_missing_corrects_nothing(drive):
+    bare = drive.measurements.copy()
+    bare[:, OUTPUTS.index("ax")] = np.nan
+    til = observer(TIL, gains={("yaw_rate", "ax"): 1.0})
+    found = til.run(drive.replace(measurements=bare))
+    assert not found["mass"].any()
+    alone = observer().run(drive).states
+    np.testing.assert_allclose(found.states, alone, rtol=1e-9, atol=1e-9)
 
 
 def test_torque_beyond_any_car_is_named(drive):

@@ -57,7 +57,8 @@ def make_estimate(**changes):
         "states": 0.01 * rng.standard_normal((SAMPLES, len(twin.STATES))),
         "parameters": rng.standard_normal((SAMPLES, len(twin.PARAMETERS))),
         "outputs": rng.standard_normal((SAMPLES, len(twin.OUTPUTS))),
-        "nominal": np.array([2125.0, 0.0, 0.0, 0.0, 800.0, 3600.0, 3900.0, 0.0, 0.0, 0.0]),
+        "extended": np.zeros((SAMPLES, len(twin.EXTENDED))),
+        "nominal": np.array([2125.0, *(0.0,) * 3, 800.0, 3600.0, 3900.0, *(0.0,) * 3, *(1.0,) * 5]),
     }
     return Estimate(**(content | changes))
 

@@ -6,10 +6,20 @@ What needs MuJoCo and compiled code is imported when it is first asked for.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from twin.channels import INPUTS, OUTPUTS, STATES, TYRE_OUTPUTS, WHEELS
+from twin.channels import (
+    EXTENDED,
+    INPUTS,
+    LOAD,
+    OUTPUTS,
+    PARAMETERS,
+    SCALES,
+    STATES,
+    TYRE_OUTPUTS,
+    WHEELS,
+)
 from twin.drive import Drive
 from twin.errors import TwinError
-from twin.load import PARAMETERS, PointMass, RigidBody, loaded, parameter_deltas
+from twin.load import PointMass, RigidBody, loaded, parameter_deltas
 from twin.noise import noise_sd, with_noise
 from twin.truck_parameters import TruckParameters
 
@@ -27,9 +37,12 @@ _COMPILED = {
 }
 
 __all__ = [
+    "EXTENDED",
     "INPUTS",
+    "LOAD",
     "OUTPUTS",
     "PARAMETERS",
+    "SCALES",
     "STATES",
     "TYRE_OUTPUTS",
     "WHEELS",

@@ -3,8 +3,7 @@
 import numpy as np
 from numba import from_dtype
 
-from twin.channels import OUTPUTS, TYRE_OUTPUTS, WHEELS
-from twin.load import PARAMETERS
+from twin.channels import OUTPUTS, PARAMETERS, TYRE_OUTPUTS, WHEELS
 from twin.tir import TYRE_DTYPE
 
 # Arrays of MjData (state, kinematics, sensors) and MjModel (inertia, steering), by MuJoCo's names;
@@ -15,8 +14,12 @@ DATA_VIEWS = (
 )
 MODEL_VIEWS = (
     *("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_subtreemass", "body_quat"),
+    *("jnt_stiffness", "qpos_spring", "tendon_stiffness", "dof_damping"),
 )
+AXLES = ("front", "rear")
 _PER_WHEEL = (len(WHEELS),)
+# Scaling factors of a tyre that parameters change: friction, then cornering stiffness
+SCALED_TYRE = ("lmux", "lmuy", "lky")
 
 CAR_DTYPE = np.dtype(
     [
@@ -37,9 +40,19 @@ CAR_DTYPE = np.dtype(
         ("track", np.float64),  # [m]
         ("steering_ratio", np.float64),
         ("ackermann", np.float64),
-        ("drag_area", np.float64),  # [m2]
+        ("drag_area", np.float64),  # [m2], in force
+        ("lift_area", np.float64, (len(AXLES),)),  # [m2], positive pushes down
+        ("axle", np.float64, (len(AXLES),)),  # x of its hubs in the chassis frame [m]
         ("spin_inertia", np.float64, _PER_WHEEL),  # of each wheel about its axis [kg m2]
-        ("nominal", np.float64, (len(PARAMETERS),)),  # the unloaded chassis
+        ("nominal", np.float64, (len(PARAMETERS),)),  # the unloaded chassis; 1 for a scale
+        ("bar", np.int64, (len(AXLES),)),  # tendon of each anti-roll bar; -1: none
+        # of each wheel what `twin.scales` scales, as the files have it
+        ("nominal_tyre", np.float64, (len(SCALED_TYRE), *_PER_WHEEL)),
+        ("nominal_drag_area", np.float64),
+        ("nominal_stiffness", np.float64, _PER_WHEEL),  # [N/m]
+        ("nominal_spring", np.float64, _PER_WHEEL),  # free position [m]
+        ("nominal_bar", np.float64, (len(AXLES),)),  # [N/m]
+        ("nominal_damping", np.float64, _PER_WHEEL),  # [N s/m]
         ("compiled_inertia", np.float64, (7,)),  # principal moments, and their axes' quaternion
         ("other_mass", np.float64, (2,)),  # of the world's and the chassis' trees, without chassis
         ("side", np.float64, _PER_WHEEL),  # 1 for a tyre as measured, -1 for a mirrored one

@@ -34,6 +34,18 @@ STATES = (
     *_wheels("wheel_speed"),  # [rad/s]
 )
 
+# TiL Eq. (2): what a load changes, as the delta from the nominal chassis: mass [kg], CM [m] and
+# inertia tensor about the body's own CM [kg m2]
+LOAD = ("mass", "cm_x", "cm_y", "cm_z", "Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz")
+# What else of the car a model gets wrong, each as the relative delta from the nominal value: peak
+# friction and cornering stiffness of the tyres, air drag, suspension springs with anti-roll bars
+# (at the nominal ride height), dampers
+SCALES = ("tyre_friction", "cornering_stiffness", "drag", "spring", "damper")
+PARAMETERS = (*LOAD, *SCALES)
+
 # What a wheel's tyre does, in the frame of its contact patch: forces [N] and moments [N m] on the
 # wheel, slip ratio [-], slip angle and camber [rad], relaxed as the tyre feels them.
 TYRE_OUTPUTS = ("fx", "fy", "fz", "mx", "my", "mz", "slip_ratio", "slip_angle", "camber")
+
+# The same of all four tyres: extended variables of TiL Eqs. (2)-(3)
+EXTENDED = tuple(f"{name}_{wheel}" for wheel in WHEELS for name in TYRE_OUTPUTS)

@@ -12,6 +12,7 @@ from numba import njit, types
 
 from twin.car import CAR
 from twin.parameters import set_load
+from twin.scales import set_scales
 from twin.states import copy_states, correct_states, states_are_sound
 from twin.stepping import step_car
 
@@ -64,15 +65,17 @@ def read_states(car, x):
 
 @_compiled(types.void, CAR, _OUT)
 def set_parameters(car, p):
-    """Sets the load parameters of the chassis, kept physically valid: TiL Eq. (2).
+    """Sets the parameters of the car, kept physically valid: TiL Eq. (2).
 
     Args:
         car: the car.
-        p: (10,) deltas from the nominal chassis, `twin.load.PARAMETERS`: mass [kg], CM [m],
-            inertia tensor about the new CM [kg m2]. On return it holds what was set: the mass has a
-            floor, the tensor is one that a rigid body can have.
+        p: (15,) deltas from the nominal car, `twin.channels.PARAMETERS`: mass [kg], CM [m], inertia
+            tensor about the new CM [kg m2], and relative ones of tyres, drag, springs and dampers.
+            On return it holds what was set: the mass has a floor, the tensor is one that a rigid
+            body can have, scales stay within `twin.scales`' bounds.
     """
     set_load(car, p.ctypes)
+    set_scales(car, p.ctypes)
 
 
 @_compiled(types.boolean, CAR)

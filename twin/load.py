@@ -11,12 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from twin.channels import SCALES
 from twin.errors import TwinError
 
-# TiL Eq. (2): what a load changes; the inertia is that about the body's own centre of mass.
-PARAMETERS = ("mass", "cm_x", "cm_y", "cm_z", "Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz")
-
-# The entries of the inertia tensor in that order
+# The entries of the inertia tensor in the order of `twin.channels.LOAD`
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 # Rounding that a valid inertia may show, of its largest entry
 _ROUNDING = 1e-12
@@ -90,8 +88,11 @@ def steiner(mass: float, offset: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def parameter_deltas(nominal: RigidBody, changed: RigidBody) -> NDArray[np.float64]:
-    """(10,) change of the `PARAMETERS` [kg, m, kg m2], each inertia about its body's own CM."""
-    return _parameters(changed) - _parameters(nominal)
+    """(15,) change of `twin.PARAMETERS` [kg, m, kg m2], each inertia about its body's own CM.
+
+    A load changes no scale: those are zero.
+    """
+    return np.append(_parameters(changed) - _parameters(nominal), np.zeros(len(SCALES)))
 
 
 def _parameters(body: RigidBody) -> NDArray[np.float64]:

@@ -45,18 +45,21 @@ def _axis(car, body, column):
 
 
 @inlined
-def _drag(car):
-    """Air drag along the body's x axis, acting at the body's origin."""
+def _air(car):
+    """Drag along the body's x axis at its origin; downforce against its z axis at each axle."""
     ahead = _axis(car, car.chassis, 0)
     origin = _vector(pointer(car.xpos), car.chassis)
     com = _vector(pointer(car.subtree_com), car.chassis)
     twist = pointer(car.cvel)
     turn, move = _vector(twist, 2 * car.chassis), _vector(twist, 2 * car.chassis + 1)
     speed = dot(combine(1.0, move, 1.0, cross(turn, difference(origin, com)), 0.0, move), ahead)
-    drag = -0.5 * AIR_DENSITY * car.drag_area * speed * abs(speed)
+    pressure = 0.5 * AIR_DENSITY * speed * abs(speed)
+    front, rear = -abs(pressure) * car.lift_area[0], -abs(pressure) * car.lift_area[1]
+    up = _axis(car, car.chassis, 2)
     applied = pointer(car.qfrc_applied)
     for i in range(3):
-        applied[i] += drag * ahead[i]
+        applied[i] += (front + rear) * up[i] - pressure * car.drag_area * ahead[i]
+    applied[4] -= car.axle[0] * front + car.axle[1] * rear  # about the body's y axis
 
 
 @inlined
@@ -149,7 +152,7 @@ def step_car(car, u, y):
     applied = pointer(car.qfrc_applied)
     for i in range(6):
         applied[i] = 0.0
-    _drag(car)
+    _air(car)
     road = load(u, 9)
     _wheels(car, load(u, 1), load(u, 5), road, _road_normal(car, unpack(road)))
     mj_step2(car.model, car.data)

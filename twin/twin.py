@@ -7,12 +7,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin import kernel
-from twin.car import DATA_VIEWS, MODEL_VIEWS, Car, new_car
-from twin.channels import INPUTS, OUTPUTS, STATES, TYRE_OUTPUTS, WHEELS
+from twin.car import AXLES, DATA_VIEWS, MODEL_VIEWS, SCALED_TYRE, Car, new_car
+from twin.channels import (
+    EXTENDED,
+    INPUTS,
+    OUTPUTS,
+    PARAMETERS,
+    SCALES,
+    STATES,
+    TYRE_OUTPUTS,
+    WHEELS,
+)
 from twin.contact import ROAD
 from twin.errors import TwinError
 from twin.four_tyres import table_of
-from twin.load import PARAMETERS
+from twin.scales import bars
 from twin.tyre import effective_radius
 from twin.vehicle import SENSORS, Vehicle
 
@@ -28,7 +37,7 @@ class Snapshot(NamedTuple):
 
     state: Array  # MuJoCo's integration state
     tyre_state: Array  # (4, 3)
-    parameters: Array  # (10,)
+    parameters: Array  # (15,)
 
 
 class Twin:
@@ -37,7 +46,7 @@ class Twin:
     Attributes:
         vehicle: what it simulates; workers rebuild their own twin from it.
         car: the same twin as compiled code sees it, valid as long as this object lives.
-        inputs, outputs, states, parameters: names, in the order of the arrays.
+        inputs, outputs, states, parameters, extended: names, in the order of the arrays.
         model, data: MuJoCo's, to look at and to draw; an observer has no business there.
     """
 
@@ -45,6 +54,7 @@ class Twin:
     outputs = OUTPUTS
     states = STATES
     parameters = PARAMETERS
+    extended = EXTENDED
     tyre_outputs = TYRE_OUTPUTS
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -174,7 +184,7 @@ class Twin:
         kernel.correct(self.car, _vector(dx, len(STATES), "correct"))
 
     def set_parameters(self, p: ArrayLike) -> Array:
-        """Sets the (10,) load parameters, see `parameters`; returns what is physically valid."""
+        """Sets the (15,) parameters, see `parameters`; returns what is physically valid."""
         p = _vector(p, len(PARAMETERS), "set_parameters").copy()
         kernel.set_parameters(self.car, p)
         return p
@@ -277,6 +287,17 @@ def _bind(model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void]) -
         steering_ratio=float(model.numeric("steering_ratio").data[0]),
         ackermann=float(model.numeric("ackermann").data[0]),
         drag_area=float(model.numeric("drag_area").data[0]),
+        lift_area=[float(model.numeric(f"lift_area_{axle}").data[0]) for axle in AXLES],
+        axle=[float(hubs[:2, 0].mean()), float(hubs[2:, 0].mean())],
+        bar=bars(model),
+        nominal_tyre=np.array([tyres[name] for name in SCALED_TYRE]),
+        nominal_drag_area=float(model.numeric("drag_area").data[0]),
+        nominal_stiffness=model.jnt_stiffness[travels].copy(),
+        nominal_spring=model.qpos_spring[model.jnt_qposadr[travels]].copy(),
+        nominal_bar=[
+            float(model.tendon_stiffness[bar]) if bar >= 0 else 0.0 for bar in bars(model)
+        ],
+        nominal_damping=model.dof_damping[model.jnt_dofadr[travels]].copy(),
         spin_inertia=model.body_inertia[wheels, 1].copy(),
         nominal=np.array(
             [
@@ -284,6 +305,7 @@ def _bind(model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void]) -
                 *model.body_ipos[chassis],
                 *np.diag(inertia),
                 *(inertia[0, 1], inertia[0, 2], inertia[1, 2]),
+                *(1.0 for _ in SCALES),
             ]
         ),
         compiled_inertia=np.append(model.body_inertia[chassis], model.body_iquat[chassis]),

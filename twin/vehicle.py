@@ -11,10 +11,17 @@ import models
 from twin.channels import WHEELS
 from twin.errors import TwinError
 from twin.load import PointMass, RigidBody
+from twin.scales import LARGEST_SCALE, LEAST_SCALE, VEHICLE_SCALES, scale_model, scale_tyres
 from twin.tir import read_tyre
 
 # Numbers of <custom> that every car needs, with the least that is allowed
-NUMBERS = {"steering_ratio": 1e-3, "ackermann": 0.0, "drag_area": 0.0}
+NUMBERS = {
+    "steering_ratio": 1e-3,
+    "ackermann": 0.0,
+    "drag_area": 0.0,  # c_D A [m2]
+    "lift_area_front": -10.0,  # -c_L A of each axle [m2], positive pushes down
+    "lift_area_rear": -10.0,
+}
 SENSOR_KINDS = {
     "acceleration": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
     "rates": mujoco.mjtSensor.mjSENS_GYRO,
@@ -30,10 +37,12 @@ class Vehicle:
     Attributes:
         source: the MJCF file.
         loads: point masses fixed to the chassis as bodies of their own.
+        scales: what differs from the files by a factor, see `scaled`.
     """
 
     source: Path
     loads: tuple[PointMass, ...] = ()
+    scales: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def load(cls, name: str | Path) -> "Vehicle":
@@ -49,6 +58,27 @@ class Vehicle:
     def with_loads(self, loads: Iterable[PointMass]) -> "Vehicle":
         """The same car with more point masses on board, positions in the chassis frame."""
         return replace(self, loads=(*self.loads, *loads))
+
+    def scaled(self, **factors: float) -> "Vehicle":
+        """The same car but for factors of `twin.scales.VEHICLE_SCALES`, as in `spring=1.1`.
+
+        Raises:
+            TwinError: a name is unknown or a factor out of range.
+        """
+        for name, factor in factors.items():
+            if name not in VEHICLE_SCALES:
+                raise TwinError(
+                    f"{self.source}: scale {name!r} is unknown; allowed: "
+                    f"{', '.join(VEHICLE_SCALES)}"
+                )
+            if not LEAST_SCALE <= factor <= LARGEST_SCALE:
+                raise TwinError(
+                    f"{self.source}: scale {name} is {factor}; allowed: {LEAST_SCALE} to "
+                    f"{LARGEST_SCALE}"
+                )
+        before = dict(self.scales)
+        merged = before | {name: before.get(name, 1.0) * f for name, f in factors.items()}
+        return replace(self, scales=tuple(merged.items()))
 
     def spec(self) -> mujoco.MjSpec:
         """The car as an editable MJCF, loads attached.
@@ -91,6 +121,7 @@ class Vehicle:
         except (ValueError, mujoco.FatalError) as error:
             raise TwinError(f"{self.source}: {' '.join(str(error).split())}") from None
         self._check(model)
+        scale_model(model, dict(self.scales))
         return model
 
     def _check(self, model: mujoco.MjModel) -> None:
@@ -148,7 +179,9 @@ class Vehicle:
             name = model.text_data[start : start + model.text_size[text] - 1].decode()
             beside = self.source.parent / name
             read.append(read_tyre(beside if beside.is_file() else models.path(name)))
-        return np.array([read[0], read[0], read[1], read[1]], dtype=read[0].dtype)
+        tyres = np.array([read[0], read[0], read[1], read[1]], dtype=read[0].dtype)
+        scale_tyres(tyres, dict(self.scales))
+        return tyres
 
     def chassis(self) -> RigidBody:
         """Mass, CM and inertia of the chassis and all that is fixed to it, in the chassis frame."""
