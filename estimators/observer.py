@@ -20,10 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from estimators.black_box import BlackBox
 from estimators.estimate import Estimate
 from estimators.law import ParameterLaw, advance_law, compile_laws
+from estimators.speed_follower import TORQUES, SpeedFollower, check_follower, follow
 from twin import Drive, Twin, TwinError, check_inputs
 from twin.kernel import correct, is_sound, read_states, set_parameters, step
 
 Array = NDArray[np.float64]
+NOT_FOLLOWED = SpeedFollower(mass=np.nan)  # stands where a drive has torques
 
 
 class Gains(NamedTuple):
@@ -32,6 +34,14 @@ class Gains(NamedTuple):
     state: NDArray[np.int64]
     output: NDArray[np.int64]
     gain: Array  # [1/s times unit of the state over unit of the output]
+
+
+class _Given(NamedTuple):
+    """What a drive gives to the observer of a twin."""
+
+    inputs: Array  # (N, nu), torques zero where the twin is to follow the speed
+    measurements: Array  # (N, ny)
+    speed: Array  # (N,) to follow [m/s]; (0,) where the drive has torques
 
 
 class Memory(NamedTuple):
@@ -53,9 +63,10 @@ class Observer:
         laws: what corrects which load parameter.
         gains: entries of K by (state, output), for example
             `{("yaw_rate", "yaw_rate"): 5.0}` [1/s].
+        follower: makes the torques of a drive that has none, from its measured `vx`.
 
     Raises:
-        TwinError: a name that the twin does not have, or a gain that is not finite.
+        TwinError: a name that the twin does not have, or a number that is not finite.
     """
 
     def __init__(
@@ -63,8 +74,12 @@ class Observer:
         twin: BlackBox,
         laws: Sequence[ParameterLaw],
         gains: Mapping[tuple[str, str], float] | None = None,
+        follower: SpeedFollower | None = None,
     ) -> None:
         self.twin = twin
+        self._follower = follower
+        if follower:
+            check_follower(follower)
         self._gains = _compile_gains(gains or {}, twin)
         self._laws, memory = compile_laws(laws, twin.dt, twin.outputs, twin.parameters)
         self._memory = Memory(
@@ -110,32 +125,30 @@ class Observer:
     def run(self, drive: Drive) -> Estimate:
         """Observes a whole drive, from the state that the observer is in.
 
+        Where the drive has no torques the twin follows the measured `vx`.
+
         Raises:
             TwinError: the drive has other channels or another sample time than the twin, a value is
                 not finite or out of range, or the twin has blown up.
         """
-        if (drive.input_names, drive.output_names) != (self.twin.inputs, self.twin.outputs):
-            raise TwinError(
-                f"drive: has channels {drive.input_names + drive.output_names}, the twin needs "
-                f"{self.twin.inputs + self.twin.outputs} in this order"
-            )
         if abs(drive.dt - self.twin.dt) > 1e-9:
             raise TwinError(
                 f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s"
             )
-        _check_measurements(drive.measurements, self.twin.outputs, "drive")
+        given = _given(drive, self.twin, self._follower)
+        _check_measurements(given.measurements, self.twin.outputs, "drive")
         if isinstance(self.twin, Twin):
-            return self._run_compiled(self.twin, drive)
-        return self._run_black_box(drive)
+            return self._run_compiled(self.twin, drive, given)
+        return self._run_black_box(drive, given)
 
-    def _run_compiled(self, twin: Twin, drive: Drive) -> Estimate:
-        check_inputs(drive.inputs, "drive")
+    def _run_compiled(self, twin: Twin, drive: Drive, given: _Given) -> Estimate:
+        check_inputs(given.inputs, "drive")
         n = len(drive)
         states, parameters, outputs = _histories(twin, n)
         extended = np.empty((n, *twin.car.tyre_output.shape))
         done = _run(
             twin.car, self._gains, self._laws, self._memory,
-            drive.inputs, drive.measurements, states, parameters, outputs, extended,
+            self._follower or NOT_FOLLOWED, given, states, parameters, outputs, extended,
         )  # fmt: skip
         if done < n:
             raise TwinError(
@@ -151,13 +164,13 @@ class Observer:
             nominal=twin.car.nominal.copy(),
         )
 
-    def _run_black_box(self, drive: Drive) -> Estimate:
+    def _run_black_box(self, drive: Drive, given: _Given) -> Estimate:
         twin = self.twin
         states, parameters, outputs = _histories(twin, len(drive))
         for k in range(len(drive)):
             states[k] = twin.read_states()
-            self._memory.u[:] = drive.inputs[k]
-            self._update_black_box(drive.measurements[k])
+            self._memory.u[:] = given.inputs[k]
+            self._update_black_box(given.measurements[k])
             parameters[k] = self._memory.p
             outputs[k] = self._memory.y
         return Estimate(
@@ -220,20 +233,54 @@ def _copy(source, target):
 
 
 @njit(cache=True, nogil=True)
-def _run(
-    car, gains, laws, memory, inputs, measurements, states, parameters, outputs, extended
-):  # fmt: skip
+def _run(car, gains, laws, memory, follower, given, states, parameters, outputs, extended):
     """All samples of a drive; returns how many were sound."""
-    for k in range(inputs.shape[0]):
+    n = given.inputs.shape[0]
+    for k in range(n):
         read_states(car, states[k])
-        _copy(inputs[k], memory.u)
-        _update(car, gains, laws, memory, measurements[k])
+        _copy(given.inputs[k], memory.u)
+        if given.speed.size:
+            follow(follower, given.speed[k], given.measurements[k, 0], states[k], memory.u)
+        _update(car, gains, laws, memory, given.measurements[k])
         _copy(memory.p, parameters[k])
         _copy(memory.y, outputs[k])
         extended[k] = car.tyre_output
         if not is_sound(car):
             return k
-    return inputs.shape[0]
+    return n
+
+
+def _given(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> _Given:
+    """Inputs and measurements in the twin's order.
+
+    Raises:
+        TwinError: the drive has others than the twin needs.
+    """
+    ny = len(twin.outputs)
+    torqueless = tuple(name for name in twin.inputs if name not in TORQUES)
+    has = (*drive.input_names, *drive.output_names)
+    if drive.output_names[:ny] != twin.outputs or drive.input_names not in (
+        twin.inputs,
+        torqueless,
+    ):
+        needed = (*twin.inputs, *twin.outputs)
+        raise TwinError(f"drive: has channels {has}, the twin needs {needed} in this order")
+    measurements = np.ascontiguousarray(drive.measurements[:, :ny])
+    if drive.input_names == twin.inputs:
+        return _Given(drive.inputs, measurements, np.empty(0))
+    if follower is None or not isinstance(twin, Twin) or "vx" not in drive.output_names:
+        raise TwinError(
+            "drive: has no torques; allowed: with a measured vx, a `Twin` and a speed follower"
+        )
+    speed = np.ascontiguousarray(drive.channel("vx"))
+    if not np.isfinite(speed).all():
+        raise TwinError(
+            f"drive: vx is {speed[~np.isfinite(speed)][0]} in sample "
+            f"{np.argmin(np.isfinite(speed))}; allowed: finite numbers, for a twin that follows it"
+        )
+    inputs = np.zeros((len(drive), len(twin.inputs)))
+    inputs[:, [twin.inputs.index(name) for name in torqueless]] = drive.inputs
+    return _Given(inputs, measurements, speed)
 
 
 def _histories(twin: BlackBox, n: int) -> tuple[Array, Array, Array]:

@@ -98,6 +98,9 @@ SCENARIOS = {
     "truck": Entry(
         f"{_TRUCK}:SCENARIO", "a truck's load changes twice: Kalman-Bucy filters beside TiL"
     ),
+    "ferrari": Entry(
+        "scenarios.ferrari:SCENARIO", "a measured lap: the sideslip of a Ferrari 250 LM"
+    ),
 }
 
 _TABLES, _FIGURES = "scenarios.til_tables", "scenarios.til_figures"
