@@ -138,10 +138,7 @@ def calibrate(task: Task, *, jobs: int = 1, evaluations: int = 20) -> Fit:
 
 
 def driven(vehicle: Vehicle) -> SpeedFollower:
-    """A follower of the speed for a car of which nothing is known but its files.
-
-    Rear wheels drive; the brakes share as the wheels' loads do at 0.5 g, or so.
-    """
+    """A follower of the speed for a car of which nothing is known but its files: rear drive."""
     twin = Twin(vehicle)
     twin.reset(0.0)
     model, radius = twin.model, twin.data.xpos[twin.car.wheel_body, 2]
@@ -150,6 +147,51 @@ def driven(vehicle: Vehicle) -> SpeedFollower:
         drag_area=float(twin.car.drag_area),
         radius_front=float(radius[:2].mean()),
         radius_rear=float(radius[2:].mean()),
+    )
+
+
+def task_of(
+    log: Path,
+    vehicle: str,
+    free: Sequence[str],
+    signals: Sequence[str],
+    between: tuple[float | None, float | None] = (None, None),
+) -> Task:
+    """A task of the command line: the twin runs free, but for gains that are freed.
+
+    Args:
+        log: a drive.
+        vehicle: a car of the project by its name, or an MJCF file.
+        free: what is fitted, see `Task`.
+        signals: what to, see `Task`.
+        between: the log's times that are used [s]; None: from its start, to its end.
+
+    Raises:
+        TwinError: a file is missing or broken, or nothing lies between the times.
+    """
+    drive, car = Drive.load(log), Vehicle.load(vehicle)
+    first, last = between
+    used = (drive.time >= (-np.inf if first is None else first)) & (
+        drive.time <= (np.inf if last is None else last)
+    )
+    if np.count_nonzero(used) < 2:
+        raise TwinError(
+            f"calibrate: no samples lie between {first} and {last} s; allowed: times from "
+            f"{drive.time[0]:g} to {drive.time[-1]:g} s"
+        )
+    candidate = Candidate(vehicle=car, follower=driven(car))
+    return Task(
+        candidate=candidate, free=tuple(free), signals=tuple(signals), drive=cut(drive, used)
+    )
+
+
+def cut(drive: Drive, samples: slice | NDArray[np.bool_]) -> Drive:
+    """These samples of a drive."""
+    return drive.replace(
+        time=drive.time[samples],
+        inputs=drive.inputs[samples],
+        measurements=drive.measurements[samples],
+        truth={name: values[samples] for name, values in drive.truth.items()},
     )
 
 

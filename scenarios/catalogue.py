@@ -6,8 +6,9 @@ import math
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from scenarios.result import Result
 
@@ -147,3 +148,8 @@ def limits() -> Callable[[str, Scenario, Settings], tuple[Result, str]]:
 def bench() -> Callable[[], Result]:
     """What measures the speed."""
     return pkgutil.resolve_name("scenarios.bench:run")
+
+
+def calibrate() -> Any:
+    """The module that fits a twin to a log."""
+    return import_module("scenarios.calibrate")

@@ -20,9 +20,10 @@ import models
 from estimators import single_track, static_map
 from estimators.speed_follower import SpeedFollower
 from scenarios import calibrate
+from scenarios.calibrate import cut
 from scenarios.candidate import Candidate
 from scenarios.catalogue import Scenario, Settings
-from scenarios.ferrari_log import PARTS, cut, data_file, load, part
+from scenarios.ferrari_log import PARTS, data_file, load, part
 from scenarios.result import Result, Row
 from twin import Drive, TwinError, Vehicle
 
@@ -84,7 +85,9 @@ def static_map_sideslip(drive: Drive) -> Array:
     ay, yaw_rate, speed = (
         static_map.low_pass(drive.channel(name), drive.dt) for name in ("ay", "yaw_rate", "vx")
     )
-    fitted = static_map.fit(ay[known], yaw_rate[known], speed[known], drive.truth["sideslip"][known])
+    fitted = static_map.fit(
+        ay[known], yaw_rate[known], speed[known], drive.truth["sideslip"][known]
+    )
     return static_map.predict(fitted, ay, yaw_rate, speed)
 
 

@@ -93,16 +93,6 @@ def part(drive: Drive, name: str) -> slice:
     return slice(start, stop)
 
 
-def cut(drive: Drive, samples: slice) -> Drive:
-    """These samples of a drive."""
-    return drive.replace(
-        time=drive.time[samples],
-        inputs=drive.inputs[samples],
-        measurements=drive.measurements[samples],
-        truth={name: values[samples] for name, values in drive.truth.items()},
-    )
-
-
 def _columns(path: Path) -> dict[str, Array]:
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -110,7 +100,9 @@ def _columns(path: Path) -> dict[str, Array]:
     try:
         table = pq.read_table(path)
     except (OSError, pa.ArrowException) as error:
-        raise TwinError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from error
+        raise TwinError(
+            f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}"
+        ) from error
     missing = [name for name in COLUMNS if name not in table.column_names]
     if missing:
         raise TwinError(

@@ -75,9 +75,7 @@ FREE: Mapping[str, Free] = {
     "sideslip_offset": _offset("rad", 0.03),
     # the measured sideslip's point lies so far before the twin's IMU
     "sideslip_lever": _offset("m", 0.6),
-    "brake_front": Free(
-        kind="follower", unit="1", start=0.65, low=0.3, high=0.9, scale=0.1
-    ),
+    "brake_front": Free(kind="follower", unit="1", start=0.65, low=0.3, high=0.9, scale=0.1),
     "locking": Free(
         kind="follower", unit="N m s/rad", start=0.0, low=0.0, high=3000.0, scale=300.0
     ),

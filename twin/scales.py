@@ -48,8 +48,10 @@ def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
     """Scales four records of `twin.tir.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
     for axle, wheels in _TYRES.items():
         for name, keys in TYRE_SCALES.items():
+            factor = np.ones(len(WHEELS))
+            factor[wheels] = factors.get(axle + name, 1.0)
             for key in keys:
-                tyres[key][wheels] *= factors.get(axle + name, 1.0)
+                tyres[key] = tyres[key] * factor
 
 
 def scale_model(model: mujoco.MjModel, factors: Mapping[str, float]) -> None:
