@@ -52,6 +52,8 @@ def fit(
     scale: ArrayLike,
     *,
     block: int,
+    memory: int = 1,
+    prior_sd: ArrayLike | None = None,
     evaluations: int = 20,
 ) -> Fit:
     """Fits n numbers.
@@ -63,6 +65,9 @@ def fit(
         bounds: (n,) least and largest.
         scale: (n,) a change that makes a difference; derivatives take a hundredth of it.
         block: rows that make a block.
+        memory: rows that count as one witness against the prior.
+        prior_sd: (n,) standard deviations of what is believed beforehand, around the start; inf:
+            nothing is.
         evaluations: the most, derivatives aside.
 
     Raises:
@@ -80,18 +85,23 @@ def fit(
             "parameters; allowed: more blocks than parameters: a longer drive, or fewer free"
         )
     steps = 0.01 * scale
+    pull = (
+        np.sqrt(memory) / np.asarray(np.inf if prior_sd is None else prior_sd) * np.ones_like(start)
+    )
 
     def jacobian(x: Array) -> Array:
         # towards the inside of the bounds
         signs = np.where(x + steps <= high, 1.0, -1.0)
         points = [x, *(x + np.diag(signs * steps))]
         here, *there = (values.ravel() for values in residuals(points))
-        return np.stack(
-            [(one - here) / step for one, step in zip(there, signs * steps, strict=True)], axis=1
-        )
+        slopes = [(one - here) / step for one, step in zip(there, signs * steps, strict=True)]
+        return np.concatenate([np.stack(slopes, axis=1), np.diag(pull)])
+
+    def errors(x: Array) -> Array:
+        return np.concatenate([residuals([x])[0].ravel(), pull * (x - start)])
 
     found = least_squares(
-        lambda x: residuals([x])[0].ravel(),
+        errors,
         start,
         jac=jacobian,  # pyright: ignore[reportArgumentType]
         bounds=(low, high),
@@ -100,31 +110,35 @@ def fit(
         xtol=TOLERANCE,
         max_nfev=evaluations,
     )
-    half = _half_widths(found.jac, found.fun, block * first.shape[1], scale)
+    last = found.fun[: first.size]
+    half = _half_widths(found.jac[: first.size], last, block * first.shape[1], scale, pull)
     return Fit(
         values=found.x,
         low=found.x - half,
         high=found.x + half,
         at_bound=np.minimum(found.x - low, high - found.x) < AT_BOUND * (high - low),
         rms_before=float(np.sqrt(np.mean(first**2))),
-        rms_after=float(np.sqrt(np.mean(found.fun**2))),
+        rms_after=float(np.sqrt(np.mean(last**2))),
         evaluations=found.nfev,
         converged=found.status > 0,
     )
 
 
-def _half_widths(jacobian: Array, residuals: Array, block: int, scale: Array) -> Array:
+def _half_widths(jacobian: Array, residuals: Array, block: int, scale: Array, pull: Array) -> Array:
     """(n,) of the confidence intervals; NaN of what lies in a direction without information."""
     from scipy.stats import t
 
     j = jacobian * scale
-    values, vectors = np.linalg.eigh(j.T @ j)
+    values, vectors = np.linalg.eigh(j.T @ j + np.diag((pull * scale) ** 2))
     known = values > LEAST_INFORMATION * values[-1]
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
     starts = np.arange(0, residuals.size, block)
     scores = np.add.reduceat(j * residuals[:, None], starts, axis=0)
     freedom = starts.size - scale.size
-    covariance = starts.size / freedom * inverse @ scores.T @ scores @ inverse
+    spread = starts.size / freedom * scores.T @ scores
+    # what the prior is worth, in the residuals' own measure, as one more witness
+    spread += np.diag((pull * scale) ** 2) * np.mean(residuals**2)
+    covariance = inverse @ spread @ inverse
     half = t.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * np.sqrt(np.diag(covariance)) * scale
     blind = (np.abs(vectors[:, ~known]) > 0.01).any(axis=1)
     return np.where(blind, np.nan, half)

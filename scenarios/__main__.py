@@ -104,6 +104,9 @@ def list_() -> None:
 @click.option(
     "--rrd", type=OutputFile(suffix=".rrd"), metavar="FILE", help="Write the Rerun timeline."
 )
+@click.option(
+    "--png", type=OutputFile(suffix=".png"), metavar="FILE", help="Draw the scenario's picture."
+)
 @click.option("--view", is_flag=True, help="Show the timeline in a window until it is closed.")
 @dask_option
 @json_option
@@ -115,6 +118,7 @@ def run(
     jobs: int,
     duration: float | None,
     rrd: Path | None,
+    png: Path | None,
     view: bool,
     dask: str | None,
     json_path: Path | None,
@@ -137,6 +141,8 @@ def run(
     _report(result, json_path)
     if rrd:
         scenario.timeline(settings, rrd)
+    if png:
+        scenario.picture(settings, png)
     if view:
         _view(scenario, settings, rrd)
 

@@ -6,9 +6,10 @@ comes out is a TOML file with values, confidence intervals and where they come f
 """
 
 import hashlib
+import math
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ SIZES = {
 }
 RATE = 20.0  # [Hz] at which residuals are taken: above what a driver excites
 BLOCK = 2.0  # [s], see `estimators.fit`; chosen: some times the memory of a car
+MEMORY = 0.5  # [s], of residuals: what a sample says against a prior; chosen
 LARGEST = 20.0  # of a residual, and of all residuals of a twin that blows up
 
 
@@ -47,12 +49,15 @@ class Task:
         free: names of `FREE`.
         signals: of `SIZES`; sideslip is that of the drive's truth.
         drive: all of what may be used.
+        prior_sd: how far a free parameter is believed to lie from its start, by name; nothing is
+            believed of the others.
     """
 
     candidate: Candidate
     free: tuple[str, ...]
     signals: tuple[str, ...]
     drive: Drive
+    prior_sd: Mapping[str, float] = field(default_factory=dict)
 
     def at(self, point: Array) -> Candidate:
         """The candidate of a point (n,)."""
@@ -133,6 +138,8 @@ def calibrate(task: Task, *, jobs: int = 1, evaluations: int = 20) -> Fit:
         ([free.low for free in named], [free.high for free in named]),
         [free.scale for free in named],
         block=round(BLOCK * RATE),
+        memory=round(MEMORY * RATE),
+        prior_sd=[task.prior_sd.get(name, np.inf) for name in task.free],
         evaluations=evaluations,
     )
 
@@ -269,6 +276,7 @@ def write(path: Path, task: Task, log: Path, found: Fit) -> None:
             "high_95": float(high),
             "unit": FREE[name].unit,
             "at_bound": bool(at_bound),
+            "prior_sd": task.prior_sd.get(name, math.inf),
         }
     with replacing(path) as partial_file:
         partial_file.write_bytes(tomli_w.dumps(content).encode())

@@ -46,6 +46,12 @@ def _without_gains(*_: object) -> NoReturn:
     raise TwinError("tune: this scenario has no gains to choose; allowed: one of a car")
 
 
+def _without_picture(*_: object) -> NoReturn:
+    from twin.errors import TwinError  # not at the top: it imports NumPy
+
+    raise TwinError("run: this scenario draws no picture; allowed: --png with ferrari")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """What a scenario's module offers as `SCENARIO`.
@@ -58,6 +64,7 @@ class Scenario:
         default_snr: signal-to-noise ratio unless the user names one [dB]; NaN: it takes none.
         drive: of the real vehicle, without noise; by default `til limits` says it has none.
         tune: chooses gains from (estimator, evaluations, jobs, TOML file to write).
+        picture: draws the run as PNG to the given path, whole or not at all.
         variation: by parameter what its load changes, around the twin's vehicle; as `drive`.
     """
 
@@ -68,6 +75,7 @@ class Scenario:
     drive: Callable[[Settings], Drive] = _without_limits
     variation: Callable[[], Mapping[str, float]] = _without_limits
     tune: Callable[[str, int, int, Path], Result] = _without_gains
+    picture: Callable[[Settings, Path], None] = _without_picture
 
 
 Reproduction = Callable[[int, int, Path], Result]

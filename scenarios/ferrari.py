@@ -24,6 +24,7 @@ from scenarios.calibrate import cut
 from scenarios.candidate import Candidate
 from scenarios.catalogue import Scenario, Settings
 from scenarios.ferrari_log import PARTS, data_file, load, part
+from scenarios.pictures import figure
 from scenarios.result import Result, Row
 from twin import Drive, TwinError, Vehicle
 
@@ -32,17 +33,21 @@ Array = NDArray[np.float64]
 VEHICLE = "ferrari_250lm"
 CALIBRATION = "ferrari_250lm.toml"
 CALIBRATED_ON, SCORED_ON = PARTS
-# Freed by `tune`, each with a reason to be what the files do not know; cross-validated within the
-# first two thirds
-FREE = (
-    *("front_tyre_friction", "rear_tyre_friction"),
-    *("front_cornering_stiffness", "rear_cornering_stiffness"),
-    *("front_load_of_largest_stiffness", "rear_load_of_largest_stiffness"),
-    *("rear_relaxation", "combined_slip", "slip_stiffness", "front_anti_roll"),
-    *("cm_x", "cm_y", "Jzz", "steering_ratio", "steering_offset"),
-    *("brake_front", "locking", "sideslip_offset", "sideslip_lever"),
-    *("yaw_rate_to_yaw_rate", "yaw_rate_to_vy"),
-)
+# Freed by `tune`, each with how far the car is believed to lie from its files (chosen). Where the
+# log tells little a number so stays one that a car can have.
+FREE = {
+    **dict.fromkeys(("front_tyre_friction", "rear_tyre_friction"), 0.2),
+    **dict.fromkeys(("front_cornering_stiffness", "rear_cornering_stiffness"), 0.35),
+    "front_load_of_largest_stiffness": 0.35,
+    "rear_load_of_largest_stiffness": 0.35,
+    **{"relaxation": 0.4, "combined_slip": 0.4, "slip_stiffness": 0.3, "front_anti_roll": 0.7},
+    **{"cm_x": 0.08, "cm_y": 0.03},  # [m]; the driver sits on the right
+    "steering_offset": 0.004,  # [rad]
+    "brake_front": 0.1,
+    "sideslip_offset": 0.004,  # [rad]
+    **{"yaw_rate_to_yaw_rate": 20.0, "yaw_rate_to_vy": 15.0},
+    **{"locking": 400.0, "sideslip_lever": 0.2, "Jzz": 250.0},
+}
 SIGNALS = ("sideslip",)
 # Mass and drag area of models/ferrari_250lm.xml, wheel radii of the log
 FOLLOWER = SpeedFollower(mass=982.0, drag_area=0.55, radius_front=0.298, radius_rear=0.33)
@@ -139,7 +144,8 @@ def tune(estimator: str, evaluations: int, jobs: int, path: Path) -> Result:
     drive = load(file)
     task = calibrate.Task(
         candidate=nominal(),
-        free=FREE,
+        free=tuple(FREE),
+        prior_sd=FREE,
         signals=SIGNALS,
         drive=cut(drive, part(drive, CALIBRATED_ON)),
     )
@@ -152,6 +158,36 @@ def _drive(settings: Settings) -> Drive:
     if settings.duration is not None:
         raise TwinError("ferrari: takes no duration; its parts are shares of the whole log")
     return load(data_file())
+
+
+def picture(settings: Settings, path: Path) -> None:
+    """Sideslip and its errors over the last third, and where on the track the twin's error sits."""
+    drive = _drive(settings)
+    samples = part(drive, SCORED_ON)
+    time, truth = drive.time[samples], drive.truth["sideslip"][samples]
+    sideslip = {name: one(drive)[samples] for name, one in ESTIMATORS.items() if name != "zero"}
+    with figure(path, title="Ferrari 250 LM, last third of the log", rows=3, shared=False) as axes:
+        above, middle, below = axes
+        above.plot(time, np.degrees(truth), "k", lw=1.0, label="measured")
+        for name, values in sideslip.items():
+            above.plot(time, np.degrees(values), lw=0.8, label=name)
+            middle.plot(time, np.degrees(values - truth), lw=0.8, label=name)
+        above.set(ylabel="sideslip [deg]")
+        middle.set(ylabel="error [deg]", xlabel="time [s]", ylim=(-2.0, 2.0))
+        above.legend(ncols=4, fontsize=7)
+        x, y = _track(drive, samples)
+        error = np.degrees(sideslip["til"] - truth)
+        dots = below.scatter(x, y, c=error, s=3, cmap="coolwarm", vmin=-0.6, vmax=0.6)
+        below.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+        below.figure.colorbar(dots, ax=below, label="til: error [deg]")
+
+
+def _track(drive: Drive, samples: slice) -> tuple[Array, Array]:
+    """Where the car goes [m], from its speed and yaw rate."""
+    yaw = np.cumsum(drive.channel("yaw_rate")[samples]) * drive.dt
+    course = yaw + drive.truth["sideslip"][samples]
+    step = drive.channel("vx")[samples] * drive.dt
+    return np.cumsum(step * np.cos(course)), np.cumsum(step * np.sin(course))
 
 
 def timeline(settings: Settings, path: Path) -> None:
@@ -170,7 +206,7 @@ def timeline(settings: Settings, path: Path) -> None:
     )
 
 
-SCENARIO = Scenario(run=run, timeline=timeline, tune=tune, vehicle=VEHICLE)
+SCENARIO = Scenario(run=run, timeline=timeline, tune=tune, picture=picture, vehicle=VEHICLE)
 
 
 if __name__ == "__main__":
