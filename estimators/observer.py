@@ -19,25 +19,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimators.black_box import BlackBox
 from estimators.estimate import Estimate
-from estimators.guard import REJECTED, SETTLING, guard, new_watch, renew
+from estimators.gains import compile_gains, place_of
+from estimators.given import Given, given_by
+from estimators.guard import LARGEST, REJECTED, SETTLING, guard, new_watch, renew
 from estimators.law import BEGUN, JUMPED, LEAST_SQUARES, PP, ParameterLaw, advance_law, compile_laws
+from estimators.speed_follower import SpeedFollower, check_follower, follow
 from twin import Drive, Twin, TwinError, check_inputs
 from twin.kernel import correct, is_sound, read_states, set_parameters, step
 
 Array = NDArray[np.float64]
-
-# Gains c of an acceleration on its own speed have no unit: v' = (1 - c) a~ + c a + ... . As the
-# tyres' share of a~ falls with the speed it belongs to, it restores v for c < 1 and drives it away
-# for c > 1.
-FEED_THROUGH = {("vx", "ax"), ("vy", "ay")}
-
-
-class Gains(NamedTuple):
-    """The linear law K (nx, ny), TiL Eq. (4), by its entries that are not zero."""
-
-    state: NDArray[np.int64]
-    output: NDArray[np.int64]
-    gain: Array  # [1/s times unit of the state over unit of the output]
+NOT_FOLLOWED = SpeedFollower(mass=np.nan)  # stands where a drive has torques
 
 
 class Memory(NamedTuple):
@@ -65,10 +56,11 @@ class Observer:
             `{("yaw_rate", "yaw_rate"): 5.0}` [1/s].
         every: corrections are made at every so-manieth sample; the twin steps at each.
         guarded: whether implausible measurements are rejected, see `estimators.guard`.
+        follower: makes the torques of a drive that has none, from its measured `vx`.
 
     Raises:
-        TwinError: a name that the twin does not have, a gain that is not finite, or a feed-through
-            of 1 or more, see `FEED_THROUGH`.
+        TwinError: a name that the twin does not have, a number that is not finite, or a
+            feed-through of 1 or more, see `estimators.gains`.
     """
 
     def __init__(
@@ -78,6 +70,7 @@ class Observer:
         gains: Mapping[tuple[str, str], float] | None = None,
         every: int = 1,
         guarded: bool = False,
+        follower: SpeedFollower | None = None,
     ) -> None:
         if every < 1:
             raise TwinError(f"observer: every is {every}; allowed: 1 or more")
@@ -85,7 +78,10 @@ class Observer:
         self.dt = every * twin.dt  # between corrections [s]
         self._every = every
         self._needed = tuple(dict.fromkeys(law.output for law in laws))
-        self._gains = _compile_gains(gains or {}, twin)
+        self._follower = follower
+        if follower:
+            check_follower(follower)
+        self._gains = compile_gains(gains or {}, twin)
         self._laws, memory = compile_laws(laws, self.dt, twin.outputs, twin.parameters)
         watched = twin.outputs if guarded else ()
         self.guarded = guarded
@@ -111,7 +107,7 @@ class Observer:
         """
         p = np.zeros(len(self.twin.parameters))
         for name, value in (parameters or {}).items():
-            p[_index(name, self.twin.parameters, "parameter")] = value
+            p[place_of(name, self.twin.parameters, "parameter")] = value
         self._memory.laws[:] = self._fresh
         self._memory.p[:] = self.twin.set_parameters(p)
         self._settle(speed)
@@ -158,7 +154,7 @@ class Observer:
         return repr(kinds).encode() + gains + self._laws.tobytes() + self._fresh.tobytes()
 
     def parameter_sd(self) -> dict[str, float]:
-        """Standard deviation of each parameter that a least-squares law fits, as the law sees it."""
+        """Standard deviation of each parameter that least squares fit, as their law sees it."""
         return {
             self.twin.parameters[law["parameter"]]: float(np.sqrt(memory[PP]))
             for law, memory in zip(self._laws, self._memory.laws, strict=True)
@@ -185,37 +181,36 @@ class Observer:
     def run(self, drive: Drive) -> Estimate:
         """Observes a whole drive, from the state that the observer is in.
 
+        Where the drive has no torques the twin follows the measured `vx`.
+
         Raises:
             TwinError: the drive has other channels or another sample time than the twin, lacks what
                 a law needs altogether, a value is not finite or out of range, or the twin has blown
                 up.
         """
-        if (drive.input_names, drive.output_names) != (self.twin.inputs, self.twin.outputs):
-            raise TwinError(
-                f"drive: has channels {drive.input_names + drive.output_names}, the twin needs "
-                f"{self.twin.inputs + self.twin.outputs} in this order"
-            )
         if abs(drive.dt - self.twin.dt) > 1e-9:
             raise TwinError(
                 f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s"
             )
-        self._check_measurements(drive.measurements, "drive")
+        given = given_by(drive, self.twin, self._follower)
+        self._check_measurements(given.measurements, "drive")
         for name in self._needed:
             if np.isnan(drive.channel(name)).all():
                 raise TwinError(f"drive: has no measurement of {name}, which a law needs")
         if isinstance(self.twin, Twin):
-            return self._run_compiled(self.twin, drive)
-        return self._run_black_box(drive)
+            return self._run_compiled(self.twin, drive, given)
+        return self._run_black_box(drive, given)
 
-    def _run_compiled(self, twin: Twin, drive: Drive) -> Estimate:
-        check_inputs(drive.inputs, "drive")
+    def _run_compiled(self, twin: Twin, drive: Drive, given: Given) -> Estimate:
+        check_inputs(given.inputs, "drive")
         n = len(drive)
         states, parameters, outputs = _histories(twin, n)
         trustworthy = np.ones(n, dtype=np.bool_)
         extended = np.empty((n, *twin.car.tyre_output.shape))
         done = _run(
             twin.car, self._gains, self._laws, self._memory, self._every,
-            drive.inputs, drive.measurements, states, parameters, outputs, extended, trustworthy,
+            self._follower or NOT_FOLLOWED, given, states, parameters, outputs, extended,
+            trustworthy,
         )  # fmt: skip
         if done < n:
             raise TwinError(
@@ -232,14 +227,14 @@ class Observer:
             trustworthy=trustworthy,
         )
 
-    def _run_black_box(self, drive: Drive) -> Estimate:
+    def _run_black_box(self, drive: Drive, given: Given) -> Estimate:
         twin = self.twin
         states, parameters, outputs = _histories(twin, len(drive))
         trustworthy = np.empty(len(drive), dtype=np.bool_)
         for k in range(len(drive)):
             states[k] = twin.read_states()
-            self._memory.u[:] = drive.inputs[k]
-            self._update_black_box(drive.measurements[k])
+            self._memory.u[:] = given.inputs[k]
+            self._update_black_box(given.measurements[k])
             parameters[k] = self._memory.p
             outputs[k] = self._memory.y
             trustworthy[k] = self.trustworthy
@@ -342,16 +337,30 @@ def _copy(source, target):
         target[i] = source[i]
 
 
+@njit(cache=True)
+def _plausible(memory, ax):
+    """The acceleration [m/s2] before the guard has seen it: NaN if it cannot be right."""
+    if memory.watch.shape[0]:
+        row = memory.watch[0]
+        if row[REJECTED] > 0.0 or abs(ax) > row[LARGEST]:
+            return np.nan
+    return ax
+
+
 @njit(cache=True, nogil=True)
 def _run(
-    car, gains, laws, memory, every, inputs, measurements, states, parameters, outputs, extended,
+    car, gains, laws, memory, every, follower, given, states, parameters, outputs, extended,
     trustworthy,
 ):  # fmt: skip
     """All samples of a drive; returns how many were sound."""
-    for k in range(inputs.shape[0]):
+    n = given.inputs.shape[0]
+    for k in range(n):
         read_states(car, states[k])
-        _copy(inputs[k], memory.u)
-        _update(car, gains, laws, memory, measurements[k], every)
+        _copy(given.inputs[k], memory.u)
+        if given.speed.size:
+            ahead = _plausible(memory, given.measurements[k, 0])
+            follow(follower, given.speed[k], ahead, states[k], memory.u)
+        _update(car, gains, laws, memory, given.measurements[k], every)
         _copy(memory.p, parameters[k])
         _copy(memory.y, outputs[k])
         extended[k] = car.tyre_output
@@ -359,7 +368,7 @@ def _run(
             trustworthy[k] = memory.unsettled[0] <= 0.0
         if not is_sound(car):
             return k
-    return inputs.shape[0]
+    return n
 
 
 def _histories(twin: BlackBox, n: int) -> tuple[Array, Array, Array]:
@@ -368,28 +377,3 @@ def _histories(twin: BlackBox, n: int) -> tuple[Array, Array, Array]:
         np.empty((n, len(names))) for names in (twin.states, twin.parameters, twin.outputs)
     )
     return states, parameters, outputs
-
-
-def _compile_gains(gains: Mapping[tuple[str, str], float], twin: BlackBox) -> Gains:
-    state, output = [], []
-    for (to, of), gain in gains.items():
-        state.append(_index(to, twin.states, "state"))
-        output.append(_index(of, twin.outputs, "output"))
-        if not np.isfinite(gain):
-            raise TwinError(f"gain {of} -> {to} is {gain}; allowed: finite numbers")
-        if (to, of) in FEED_THROUGH and not gain < 1.0:
-            raise TwinError(
-                f"gain {of} -> {to} is {gain}; allowed: less than 1, or the tyres' restoring forces "
-                "change their sign"
-            )
-    return Gains(
-        np.array(state, dtype=np.int64),
-        np.array(output, dtype=np.int64),
-        np.array(list(gains.values()), dtype=np.float64),
-    )
-
-
-def _index(name: str, names: tuple[str, ...], kind: str) -> int:
-    if name not in names:
-        raise TwinError(f"{kind} {name!r} is unknown; allowed: {', '.join(names)}")
-    return names.index(name)

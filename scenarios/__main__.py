@@ -17,6 +17,7 @@ from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Scenario, Settings, Tu
 from scenarios.options import (
     STANDARD_OUTPUT,
     Name,
+    Names,
     OutputFile,
     count_option,
     dask_option,
@@ -109,6 +110,9 @@ def list_() -> None:
     metavar="FILE",
     help="Gains of the default estimator, as `til tune` writes them.",
 )
+@click.option(
+    "--png", type=OutputFile(suffix=".png"), metavar="FILE", help="Draw the scenario's picture."
+)
 @click.option("--view", is_flag=True, help="Show the timeline in a window until it is closed.")
 @dask_option
 @json_option
@@ -121,6 +125,7 @@ def run(
     duration: float | None,
     rrd: Path | None,
     gains: Path | None,
+    png: Path | None,
     view: bool,
     dask: str | None,
     json_path: Path | None,
@@ -146,6 +151,8 @@ def run(
     _report(result, json_path)
     if rrd:
         scenario.timeline(settings, rrd)
+    if png:
+        scenario.picture(settings, png)
     if view:
         _view(scenario, settings, rrd)
 
@@ -284,6 +291,52 @@ def inspect(log: Path, map_path: Path | None) -> None:
 def new_car(name: str) -> None:
     """Write NAME.toml, a commented description of a car to fill in."""
     click.echo(f"{catalogue.new_car()(name)} describes a car: change what you know of yours.")
+
+
+@program.command()
+@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, or an MJCF file.")
+@click.option("--free", required=True, type=Names(), metavar="NAME,...", help="What is fitted.")
+@click.option(
+    "--fit",
+    "signals",
+    type=Names(),
+    metavar="NAME,...",
+    default="ay,yaw_rate",
+    show_default=True,
+    help="Signals that the twin is to show as the log does; sideslip is that of the log's truth.",
+)
+@click.option("--from", "first", type=float, metavar="S", help="First time used.")
+@click.option("--to", "last", type=float, metavar="S", help="Last time used.")
+@count_option("--evaluations", 20, "How many steps at most.")
+@jobs_option
+@click.option(
+    "--out", type=OutputFile(suffix=".toml"), metavar="FILE", help="[default: out/calibrate.toml]"
+)
+@json_option
+def calibrate(
+    log: Path,
+    vehicle: str,
+    free: tuple[str, ...],
+    signals: tuple[str, ...],
+    first: float | None,
+    last: float | None,
+    evaluations: int,
+    jobs: int,
+    out: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Fit the twin of a car to LOG, a recorded drive, by bounded least squares.
+
+    FILE holds values, their 95 % confidence intervals and where they come from. A factor of 1 and a
+    delta or offset of 0 are what the car's files say. Where the log has no torques the twin
+    follows its measured vx, and the mass is not observable.
+    """
+    path = out or Path("out", "calibrate.toml")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    calibration = catalogue.calibrate()
+    task = calibration.task_of(log, vehicle, free, signals, (first, last))
+    _report(calibration.run(task, log, path, jobs=jobs, evaluations=evaluations), json_path)
 
 
 @program.command()

@@ -6,8 +6,9 @@ import math
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from scenarios.result import Result
 
@@ -73,6 +74,12 @@ def _without_gains(*_: object) -> NoReturn:
     raise TwinError("tune: this scenario has no gains to choose; allowed: one of a car")
 
 
+def _without_picture(*_: object) -> NoReturn:
+    from twin.errors import TwinError  # not at the top: it imports NumPy
+
+    raise TwinError("run: this scenario draws no picture; allowed: --png with ferrari")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """What a scenario's module offers as `SCENARIO`.
@@ -86,6 +93,7 @@ class Scenario:
         drive: of the real vehicle, without noise; by default `til limits` says it has none.
         tune: chooses gains and writes them to a file.
         takes_gains: whether it heeds `Settings.gains`.
+        picture: draws the run as PNG to the given path, whole or not at all.
         variation: by parameter what its load changes, around the twin's vehicle; as `drive`.
     """
 
@@ -97,6 +105,7 @@ class Scenario:
     variation: Callable[[], Mapping[str, float]] = _without_limits
     takes_gains: bool = False
     tune: Callable[[Tuning], Result] = _without_gains
+    picture: Callable[[Settings, Path], None] = _without_picture
 
 
 Reproduction = Callable[[int, int, Path], Result]
@@ -133,6 +142,9 @@ SCENARIOS = {
     ),
     "truck": Entry(
         f"{_TRUCK}:SCENARIO", "a truck's load changes twice: Kalman-Bucy filters beside TiL"
+    ),
+    "ferrari": Entry(
+        "scenarios.ferrari:SCENARIO", "a measured lap: the sideslip of a Ferrari 250 LM"
     ),
 }
 
@@ -190,3 +202,8 @@ def inspection() -> Callable[[Path, Path | None], str]:
 def new_car() -> Callable[[str], Path]:
     """What writes the description of a new car of that name, and returns its path."""
     return pkgutil.resolve_name("twin.car_file:write_template")
+
+
+def calibrate() -> Any:
+    """The module that fits a twin to a log."""
+    return import_module("scenarios.calibrate")

@@ -258,9 +258,7 @@ def score(run: Run) -> Score:
     """
     drive, belief = observe(run)
     truth = drive.truth
-    forces = np.column_stack(
-        [truth["fy_fl"] + truth["fy_fr"], truth["fy_rl"] + truth["fy_rr"]]
-    )
+    forces = np.column_stack([truth["fy_fl"] + truth["fy_fr"], truth["fy_rl"] + truth["fy_rr"]])
     front, rear = np.sqrt(np.mean((belief.axle_force - forces) ** 2, axis=0)).tolist()
     return Score(
         sideslip=_rms(np.degrees(belief.sideslip - truth["sideslip"])),

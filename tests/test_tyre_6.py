@@ -212,7 +212,9 @@ def test_forces_of_an_upright_neutral_tyre_are_those_of_mf_52(tyre):
 def test_camber_stiffness_is_pky6_at_the_nominal_load(tyre):
     new = {**NEW, "OPERATING_CONDITIONS": {}}
     record = tyre(text_of(new))
-    ahead, behind = (magic_formula(record, 6000.0, 0.0, 0.0, g, 20.0, 1.0)[1] for g in (1e-5, -1e-5))
+    ahead, behind = (
+        magic_formula(record, 6000.0, 0.0, 0.0, g, 20.0, 1.0)[1] for g in (1e-5, -1e-5)
+    )
     # over alpha the slope is K_y cos of where the shifts put it: near one, not quite
     assert (ahead - behind) / 2e-5 == pytest.approx(-0.9 * 6000.0, rel=0.02)
 
@@ -225,7 +227,9 @@ def test_car_may_have_a_tyre_of_each_kind(tmp_path, tyre):
     twin.reset(20.0)
     made = run(twin, inputs(1.0, steering=0.5))
     speed = made.states[-1, 14]
-    for wheel, (record, side) in enumerate(zip(vehicle.tyres(), (1.0, -1.0, 1.0, -1.0), strict=True)):
+    for wheel, (record, side) in enumerate(
+        zip(vehicle.tyres(), (1.0, -1.0, 1.0, -1.0), strict=True)
+    ):
         fx, fy, fz, *_, kappa, alpha, camber = made.tyres[-1, wheel]
         alone = magic_formula(record, fz, kappa, alpha, camber, speed, side)
         np.testing.assert_allclose((fx, fy), alone[:2], rtol=1e-9, atol=1e-6)
