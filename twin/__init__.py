@@ -24,11 +24,13 @@ from twin.noise import noise_sd, with_noise
 from twin.truck_parameters import TruckParameters
 
 if TYPE_CHECKING:
+    from twin.fleet import Fleet
     from twin.truck_twin import TruckTwin
     from twin.twin import Snapshot, Twin, check_inputs
     from twin.vehicle import Vehicle
 
 _COMPILED = {
+    "Fleet": "twin.fleet",
     "Snapshot": "twin.twin",
     "TruckTwin": "twin.truck_twin",
     "Twin": "twin.twin",
@@ -47,6 +49,7 @@ __all__ = [
     "TYRE_OUTPUTS",
     "WHEELS",
     "Drive",
+    "Fleet",
     "PointMass",
     "RigidBody",
     "Snapshot",
