@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimators import joint_kernel
 from estimators.estimate import Estimate
-from estimators.joint_kernel import Log, Memory, Setup
+from estimators.joint_kernel import RING, Log, Memory, Setup
 from twin import OUTPUTS, PARAMETERS, SCALES, Drive, Fleet, Snapshot, TwinError, Vehicle, check_inputs
 
 Array = NDArray[np.float64]
 
-BIASES = OUTPUTS[:6]
+# What is estimated of the sensors: biases of the IMU, the delay of all signals, the IMU's position
+# beside where the twin has it. None of them needs a twin.
+FAULTS = (*(f"bias_{name}" for name in OUTPUTS[:6]), "delay", "imu_x", "imu_y", "imu_z")
 # Standard deviations before the first sample: a full car more or less, its CM anywhere between the
 # seats, and a model of tyres and springs from a data sheet
 PRIOR_SD = {
@@ -27,8 +29,10 @@ PRIOR_SD = {
     **dict.fromkeys(SCALES, 0.15),
     "drag": 0.3,
 }
-# Of a sensor's bias: a cheap IMU [m/s2, rad/s]
-BIAS_SD = (0.1, 0.1, 0.1, 0.005, 0.005, 0.005)
+# A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m]
+FAULT_SD = dict(
+    zip(FAULTS, (0.1, 0.1, 0.1, 0.005, 0.005, 0.005, 0.01, 0.07, 0.07, 0.07), strict=True)
+)
 # How far each twin is off: as in `estimators.limits`, large beside rounding, small beside curvature
 OFFSETS = {
     "mass": 10.0,
@@ -46,10 +50,12 @@ class JointSettings:
 
     Attributes:
         parameters: of `twin.PARAMETERS`, one twin for each.
-        biases: whether those of the IMU's six channels are estimated along; they need no twin.
+        faults: of `FAULTS`, what is estimated of the sensors along.
         prior_sd: by parameter, instead of `PRIOR_SD`.
         noise_factor: by which the noise's variance is taken larger than it is, for what the
             linearisation leaves out.
+        doubt: by which it is first taken larger besides, until innovations prove to be white.
+        doubt_memory: how fast that is seen [s].
         drift: share of its prior sd that a parameter may wander over a second.
         step: largest share of its prior sd by which an estimate moves in a block.
         hold_off: seconds before the first correction.
@@ -60,9 +66,11 @@ class JointSettings:
     """
 
     parameters: tuple[str, ...] = PARAMETERS
-    biases: bool = True
+    faults: tuple[str, ...] = FAULTS
     prior_sd: Mapping[str, float] = field(default_factory=dict)
-    noise_factor: float = 1.5
+    noise_factor: float = 1.0
+    doubt: float = 3.0
+    doubt_memory: float = 10.0
     drift: float = 0.001
     step: float = 0.1
     hold_off: float = 1.0
@@ -76,16 +84,16 @@ class JointEstimate(Estimate):
     """A run of the joint observer.
 
     Attributes:
-        estimated: p names of what was estimated, in the order of `covariance`; biases follow.
+        estimated: p names of what was estimated, in the order of `covariance`; faults follow.
         sd: (N, p + b) standard deviation of each estimate.
-        biases: (N, b) [m/s2, rad/s].
+        faults: (N, b) of the sensors, in the order of `JointSettings.faults`.
         covariance: (p + b, p + b) at the end.
         information: (p + b, p + b) Fisher's, of all that was used.
     """
 
     estimated: tuple[str, ...]
     sd: Array
-    biases: Array
+    faults: Array
     covariance: Array
     information: Array
 
@@ -109,17 +117,17 @@ class JointObserver:
         names = settings.parameters
         _check(settings, np.asarray(noise_sd, dtype=np.float64))
         self.fleet = Fleet(vehicle, len(names) + 1)
-        self.estimated = (*names, *(f"bias_{name}" for name in BIASES if settings.biases))
+        self.estimated = (*names, *settings.faults)
         prior = PRIOR_SD | dict(settings.prior_sd)
         self._prior = np.array(
-            [prior[name] for name in names] + (list(BIAS_SD) if settings.biases else [])
+            [prior[name] for name in names] + [FAULT_SD[name] for name in settings.faults]
         )
         first = self.fleet.twins[0]
         self.dt = first.dt
         self._setup = Setup(
             index=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             offset=np.array([OFFSETS[name] for name in names]),
-            bias_output=np.arange(len(self.estimated) - len(names)),
+            fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
             step_limit=settings.step * self._prior,
             drift=(settings.drift * self._prior) ** 2,
             noise=settings.noise_factor * np.asarray(noise_sd, dtype=np.float64) ** 2,
@@ -130,6 +138,8 @@ class JointObserver:
             least_excitation=settings.least_excitation,
             rate_weight=900.0,
             memory=1.0,
+            doubt=settings.doubt,
+            doubt_memory=settings.doubt_memory,
             dt=self.dt,
         )
         n, p, q = len(self.fleet), len(PARAMETERS), self._prior.size
@@ -139,7 +149,9 @@ class JointObserver:
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
             count=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
             excitation=np.zeros((2, 4)), innovation=np.zeros(ny), expected=np.zeros(ny),
-            information=np.zeros((q, q)), clock=np.zeros(2, dtype=np.int64),
+            information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
+            ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
+            doubt=np.zeros(ny), window=np.zeros((3, ny)), window_h=np.zeros((ny, q)),
         )  # fmt: skip
         self.reset(0.0)
 
@@ -167,6 +179,7 @@ class JointObserver:
             memory.theta[PARAMETERS.index(name)] = value
         memory.z[: self._setup.index.size] = memory.theta[self._setup.index]
         memory.covariance[:] = np.diag(self._prior**2)
+        memory.doubt[:] = self.settings.doubt
         for i, twin in enumerate(self.fleet.twins):
             p = memory.theta.copy()
             if i > 0:
@@ -188,7 +201,7 @@ class JointObserver:
             outputs=np.empty((n, len(OUTPUTS))),
             extended=np.empty((n, *twin.car.tyre_output.shape)),
             sd=np.empty((n, q)),
-            biases=np.empty((n, q - self._setup.index.size)),
+            faults=np.empty((n, q - self._setup.index.size)),
         )
         done = joint_kernel.run(
             self.fleet.cars, self._setup, self._memory, drive.inputs, drive.measurements, log
@@ -204,7 +217,7 @@ class JointObserver:
             nominal=self._setup.nominal.copy(),
             estimated=self.estimated,
             sd=log.sd,
-            biases=log.biases,
+            faults=log.faults,
             covariance=self._memory.covariance.copy(),
             information=self._memory.information.copy(),
         )

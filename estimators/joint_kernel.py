@@ -29,15 +29,20 @@ EXCITING = np.array([AX, AY, ROLL_RATE, PITCH_RATE])
 ABSENT = 1e12  # variance of a channel that has no measurement
 # Slower than this a wheel speed tells no speed of the car [rad/s]; chosen
 LEAST_SPIN = 1.0
-SAMPLES, BLOCKS = 0, 1  # what the clock counts
+SAMPLES, BLOCKS, TOTAL = 0, 1, 2  # what the clock counts: of the block, blocks, of all
+# What is estimated of the sensors besides parameters: biases, delay, and the place of the IMU
+DELAY, POSITION = IMU, IMU + 1
+RING = 64  # samples: the longest delay
+LARGEST_DOUBT = 1e3  # of one window
+WINDOW = 16  # blocks over which innovations are summed to see whether they are white
 
 
 class Setup(NamedTuple):
-    """What does not change: p parameters, q estimates (parameters, then biases)."""
+    """What does not change: p parameters, q estimates (parameters, then faults of sensors)."""
 
     index: Indices  # (p,) of each parameter among the twin's
     offset: Array  # (p,) of its twin
-    bias_output: Indices  # (q - p,) the channel of each bias
+    fault: Indices  # (q - p,) of the sensors: channel of a bias, DELAY, POSITION + axis
     step_limit: Array  # (q,) the most an estimate may move in a block
     drift: Array  # (q,) variance per second
     noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
@@ -48,6 +53,8 @@ class Setup(NamedTuple):
     least_excitation: float  # [m2/s4]
     rate_weight: float  # of a roll or pitch rate in it [m2/s2]
     memory: float  # of excitation [s]
+    doubt: float  # first factor of the noise's variance, before innovations prove it white
+    doubt_memory: float  # [s]
     dt: float  # of a sample [s]
 
 
@@ -68,7 +75,13 @@ class Memory(NamedTuple):
     innovation: Array  # (ny,) of the last block
     expected: Array  # (ny,) its variance
     information: Array  # (q, q) of what was used
-    clock: Indices  # (2,) samples in the block, blocks
+    ring: Array  # (RING, n, ny) the twins' last outputs
+    late: Array  # (n, ny) the twins' outputs of the delay ago
+    edge: Array  # (ny,) of twin 0 at the end of the block before
+    doubt: Array  # (ny,) factor of each channel's variance that its innovations show
+    window: Array  # (3, ny) sums of innovations, of their variance; number of blocks
+    window_h: Array  # (ny, q) sums of sensitivities
+    clock: Indices  # (3,)
 
 
 @njit(cache=True, nogil=True)
@@ -76,8 +89,10 @@ def update(cars, setup, memory, u, y):
     """One sample of inputs (nu,) and measurements (ny,)."""
     for i in range(cars.size):
         step(cars[i], u, memory.out[i])
+    _delay(setup, memory)
+    for i in range(cars.size):
         for j in range(NY):
-            memory.total[i, j] += memory.out[i, j]
+            memory.total[i, j] += memory.late[i, j]
     for j in range(NY):
         if not np.isnan(y[j]):
             memory.measured[j] += y[j]
@@ -92,6 +107,28 @@ def update(cars, setup, memory, u, y):
     memory.total[:] = 0.0
     memory.measured[:] = 0.0
     memory.count[:] = 0.0
+    memory.edge[:] = memory.late[0]
+
+
+@njit(cache=True, nogil=True)
+def _delay(setup, memory):
+    """Fills memory.late with what the sensors should show now, given their estimated delay."""
+    k, late = memory.clock[TOTAL], 0.0
+    for i in range(setup.fault.size):
+        if setup.fault[i] == DELAY:
+            late = memory.z[setup.index.size + i] / setup.dt
+    memory.ring[k % RING] = memory.out
+    whole = min(max(int(np.floor(late)), 0), RING - 2)
+    part = late - whole  # below zero it extrapolates
+    newer, older = min(whole, k), min(whole + 1, k)
+    newer, older = (k - newer) % RING, (k - older) % RING
+    for i in range(memory.late.shape[0]):
+        for j in range(NY):
+            new, old = memory.ring[newer, i, j], memory.ring[older, i, j]
+            memory.late[i, j] = new + part * (old - new)
+    if k == 0:
+        memory.edge[:] = memory.late[0]
+    memory.clock[TOTAL] += 1
 
 
 @njit(cache=True, nogil=True)
@@ -103,9 +140,29 @@ def _sensitivity(setup, memory):
         for j in range(NY):
             difference = memory.total[i + 1, j] - memory.total[0, j]
             h[j, i] = difference / (setup.block * setup.offset[i])
+    seconds = setup.block * setup.dt
+    change = (memory.late[0] - memory.edge) / seconds
+    rates = memory.total[0, 3:IMU] / setup.block
     for i in range(p, q):
-        h[setup.bias_output[i - p], i] = 1.0
+        fault = setup.fault[i - p]
+        if fault < IMU:
+            h[fault, i] = 1.0
+        elif fault == DELAY:
+            h[:, i] = -change
+        else:
+            arm = np.zeros(3)
+            arm[fault - POSITION] = 1.0
+            turning = _cross(rates, _cross(rates, arm))
+            h[:3, i] = _cross(change[3:IMU], arm) + turning
     return h
+
+
+@njit(cache=True, nogil=True)
+def _cross(a, b):
+    """Vector product of two (3,)."""
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -117,9 +174,10 @@ def _innovation(setup, memory, h):
             r[j] = memory.measured[j] / memory.count[j] - memory.total[0, j] / setup.block
             variance[j] = setup.noise[j] / memory.count[j]
     for i in range(setup.index.size, memory.z.size):
-        j = setup.bias_output[i - setup.index.size]
-        if variance[j] < ABSENT:
-            r[j] -= memory.z[i]
+        if setup.fault[i - setup.index.size] != DELAY:  # which is in the outputs already
+            for j in range(IMU):
+                if variance[j] < ABSENT:
+                    r[j] -= h[j, i] * memory.z[i]
     return r, variance
 
 
@@ -141,10 +199,38 @@ def _is_excited(setup, memory):
 
 
 @njit(cache=True, nogil=True)
+def _weigh(setup, memory, h, r, variance):
+    """Scales the variances by what sums of innovations show of noise that is not white.
+
+    A sum over a window has the variance of white noise and of what the parameters are not known
+    by; what exceeds it is coloured noise or an error of the model, and counts as noise.
+    """
+    window, summed = memory.window, memory.window_h
+    for j in range(NY):
+        if variance[j] < ABSENT:
+            window[0, j] += r[j]
+            window[1, j] += variance[j]
+            summed[j] += h[j]
+            variance[j] *= max(memory.doubt[j], 1.0)
+    window[2] += 1.0
+    if window[2, 0] < WINDOW:
+        return
+    share = WINDOW * setup.block * setup.dt / setup.doubt_memory
+    for j in range(NY):
+        if window[1, j] > 0.0:
+            known = summed[j] @ (memory.covariance @ summed[j])
+            excess = (window[0, j] ** 2 - known) / window[1, j]
+            memory.doubt[j] += share * (min(max(excess, 0.0), LARGEST_DOUBT) - memory.doubt[j])
+    window[:] = 0.0
+    summed[:] = 0.0
+
+
+@njit(cache=True, nogil=True)
 def _estimate(cars, setup, memory):
     """A Kalman step on the parameters, and the twins' states with them."""
     h = _sensitivity(setup, memory)
     r, variance = _innovation(setup, memory, h)
+    _weigh(setup, memory, h, r, variance)
     q, covariance = memory.z.size, memory.covariance
     seconds = setup.block * setup.dt
     hp = h @ covariance
@@ -171,6 +257,9 @@ def _estimate(cars, setup, memory):
         memory.information[:] += h.T @ informed
         before = memory.z.copy()
         memory.z[:] += share * move
+        for i in range(setup.index.size, q):
+            if setup.fault[i - setup.index.size] == DELAY:
+                memory.z[i] = min(max(memory.z[i], -setup.dt), (RING - 2) * setup.dt)
         project(memory.z, covariance, setup.index, setup.nominal, memory.theta)
         _move(cars, setup, memory, memory.z - before)
     for i in range(q):
@@ -240,7 +329,7 @@ def run(cars, setup, memory, inputs, measurements, log):
         log.extended[k] = cars[0].tyre_output
         for i in range(memory.z.size):
             log.sd[k, i] = np.sqrt(memory.covariance[i, i])
-        log.biases[k] = memory.z[p:]
+        log.faults[k] = memory.z[p:]
         for i in range(cars.size):
             if not is_sound(cars[i]):
                 return k
@@ -255,4 +344,4 @@ class Log(NamedTuple):
     outputs: Array  # (N, ny)
     extended: Array  # (N, 4, 9)
     sd: Array  # (N, q)
-    biases: Array  # (N, q - p)
+    faults: Array  # (N, q - p)
