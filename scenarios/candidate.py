@@ -44,7 +44,7 @@ class Candidate:
         gains = {**self.gains, **{FREE[n].of: value for n, value in self.of("gain").items()}}
         follower = self.follower and self.follower._replace(**self.of("follower"))
         twin = Twin(self.vehicle.scaled(**self.of("scale")))
-        observer = Observer(twin, (), gains, follower)
+        observer = Observer(twin, (), gains, follower=follower)
         observer.reset(_first_speed(drive), self.of("load"))
         return observer.run(self._shifted(drive))
 
