@@ -34,11 +34,11 @@ from scenarios.result import Result, json_text, write_json
 def main(args: Sequence[str] | None = None) -> int:
     """Runs a command; returns the exit status."""
     try:
-        program.main(args, prog_name="til", standalone_mode=False)
+        status = program.main(args, prog_name="til", standalone_mode=False)
     except click.ClickException as error:
         click.echo("til: " + " ".join(_message(error).split()), err=True)
         return error.exit_code
-    return 0
+    return status if isinstance(status, int) else 0
 
 
 def _message(error: click.ClickException) -> str:
@@ -337,6 +337,83 @@ def calibrate(
     calibration = catalogue.calibrate()
     task = calibration.task_of(log, vehicle, free, signals, (first, last))
     _report(calibration.run(task, log, path, jobs=jobs, evaluations=evaluations), json_path)
+
+
+@program.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True)
+@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, MJCF or TOML file.")
+@click.option(
+    "--map",
+    "map_path",
+    type=click.Path(path_type=Path),
+    metavar="MAP.toml",
+    help="Which channels of the logs are ours; a drive of ours needs none.",
+)
+@click.option(
+    "--estimator",
+    "estimators",
+    type=click.Choice(["til", "joint"]),
+    multiple=True,
+    default=("til",),
+    show_default=True,
+    help="til: states, sideslip and mass; joint: all load parameters, tyres, springs. Repeatable.",
+)
+@jobs_option
+@dask_option
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    default="out",
+    show_default=True,
+    help="Folder for timelines, histories and finished results; every job must reach it.",
+)
+@click.option(
+    "--state",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Of a stream: go on where FILE was left, and leave it again at the end.",
+)
+@json_option
+def estimate(
+    logs: tuple[str, ...],
+    vehicle: str,
+    map_path: Path | None,
+    estimators: tuple[str, ...],
+    jobs: int,
+    dask: str | None,
+    out: Path,
+    state: Path | None,
+    json_path: Path | None,
+) -> int:
+    """Observe recorded drives: LOG is Parquet, CSV or MDF 4, or - for standard input.
+
+    Of each LOG DIR receives NAME.ESTIMATOR.rrd, the timeline; .parquet, the estimates over time;
+    and .json, the result. A second call skips what is finished there, unless the log, the map, the car
+    or a version has changed. Truth in a log is only scored against. A bad log does not stop the
+    others; the exit status is then 2.
+
+    From standard input come samples, one JSON object a line or CSV with a row of names: time [s],
+    inputs and measurements by our names or the map's, at any rate. Estimates go to standard output
+    as they come, one JSON object a line.
+    """
+    from scenarios.progress import cluster  # not at the top: it imports joblib
+
+    if "-" in logs:
+        if len(logs) > 1 or json_path or estimators != ("til",) or dask:
+            raise Mistake("estimate: a stream, -, stands alone; allowed: --map, --vehicle, --state")
+        return catalogue.estimate_stream().run(vehicle, map_path, state)
+    if state:
+        raise Mistake("--state: is that of a stream; allowed: LOG is -")
+    with cluster(dask):
+        result, text, bad = catalogue.estimate().run(
+            [Path(log) for log in logs],
+            vehicle=vehicle, map_path=map_path, estimators=estimators, jobs=jobs, out=out,
+        )  # fmt: skip
+    _report(result, json_path, f"{text}\n\n{result.table()}" if result.rows else text)
+    for line in bad:
+        click.echo(f"til: {line}", err=True)
+    return 2 if bad else 0
 
 
 @program.command()

@@ -207,3 +207,13 @@ def new_car() -> Callable[[str], Path]:
 def calibrate() -> Any:
     """The module that fits a twin to a log."""
     return import_module("scenarios.calibrate")
+
+
+def estimate() -> Any:
+    """The module that observes recorded drives."""
+    return import_module("scenarios.estimate")
+
+
+def estimate_stream() -> Any:
+    """The module that observes samples from standard input."""
+    return import_module("scenarios.estimate_stream")

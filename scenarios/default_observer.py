@@ -13,6 +13,7 @@ import numpy as np
 
 from estimators.law import ParameterLaw
 from estimators.observer import Observer
+from estimators.speed_follower import SpeedFollower
 from estimators.stream import rolling_radius
 from twin import WHEELS, Twin, Vehicle
 
@@ -36,8 +37,20 @@ class Default(NamedTuple):
     left_out: tuple[str, ...]  # sentences
 
 
-def default_observer(vehicle: Vehicle, measured: Set[str]) -> Default:
+def default_observer(
+    vehicle: Vehicle,
+    measured: Set[str],
+    *,
+    mass: bool = True,
+    follower: SpeedFollower | None = None,
+) -> Default:
     """The guarded observer of a vehicle whose log measures these outputs.
+
+    Args:
+        vehicle: of the twin.
+        measured: names of what the log measures.
+        mass: whether the log's torques and accelerations can tell it.
+        follower: of the speed, for a log without torques.
 
     Raises:
         TwinError: the vehicle's files are missing or broken.
@@ -54,13 +67,9 @@ def default_observer(vehicle: Vehicle, measured: Set[str]) -> Default:
     gains = {pair: gain for pair, gain in wanted.items() if pair[1] in measured}
     missing = [of for _, of in wanted if of not in measured]
     left_out = [f"Without {name} the twin is not corrected by it." for name in missing]
-    laws = []
-    if "ax" in measured:
-        laws = [mass_law(twin, radius, measured)]
-    else:
-        left_out.append("Without ax the mass is not estimated.")
+    laws = [mass_law(twin, radius, measured)] if mass else []
     return Default(
-        observer=Observer(twin, laws, gains, guarded=True),
+        observer=Observer(twin, laws, gains, guarded=True, follower=follower),
         rolling_radius=radius,
         parameters=tuple(law.parameter for law in laws),
         left_out=tuple(left_out),
