@@ -109,6 +109,9 @@ class ParameterLaw:
         least_signal: the law rests while the instrument is smaller.
         compensation: of the twin's signal, what it gets for each rad/s by which a wheel of the
             vehicle is ahead of the twin's: gain on wheel speeds times I / (R M), see the module.
+        largest_compensation: the law rests while it gets more, or no wheel tells: its twin is
+            elsewhere, and what the tyres hand on is limited.
+        largest: of the parameter, in either direction: what is physical.
     """
 
     parameter: str
@@ -131,6 +134,8 @@ class ParameterLaw:
     largest_yaw_rate: float = math.inf
     least_signal: float = 0.0
     compensation: float = 0.0
+    largest_compensation: float = math.inf
+    largest: float = math.inf
 
     def __post_init__(self) -> None:
         """Checks names and numbers."""
@@ -152,10 +157,9 @@ class ParameterLaw:
         ):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: 0 or more")
-        if not self.largest_yaw_rate > 0.0:
-            raise TwinError(
-                f"law: largest_yaw_rate is {self.largest_yaw_rate}; allowed: more than 0"
-            )
+        for name in ("largest_yaw_rate", "largest_compensation", "largest"):
+            if not getattr(self, name) > 0.0:
+                raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
         for name in ("prior_sd", "noise_density", "filter_time"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
@@ -172,6 +176,7 @@ SIGN, LEAST_SQUARES, INTEGRAL = range(len(FORMS))
 _COPIED = (
     *("gain", "scale", "drift", "leak", "offset_jump", "filter_time", "mode_damping"),
     *("least_wheel_speed", "largest_yaw_rate", "least_signal", "compensation"),
+    *("largest_compensation", "largest"),
 )
 # A law as compiled code sees it. A record goes into a function as one pointer; a tuple of arrays
 # would cost more than the law.
@@ -196,6 +201,8 @@ LAW_DTYPE = np.dtype(
         ("largest_yaw_rate", np.float64),
         ("least_signal", np.float64),
         ("compensation", np.float64),
+        ("largest_compensation", np.float64),
+        ("largest", np.float64),
     ],
     align=True,
 )
@@ -267,15 +274,16 @@ def _moving(y, least):
 
 @njit(cache=True)
 def _lead(y, twin_y):
-    """By how much the vehicle's wheels are ahead of the twin's, summed [rad/s].
+    """By how much the vehicle's wheels are ahead of the twin's, summed [rad/s], and how many tell.
 
     A wheel speed that is not measured has not been corrected either.
     """
-    lead = 0.0
+    lead, count = 0.0, 0
     for i in range(6, 10):
         if not np.isnan(y[i]):
             lead += y[i] - twin_y[i]
-    return lead
+            count += 1
+    return lead, count
 
 
 @njit(cache=True)
@@ -292,8 +300,12 @@ def advance_law(law, memory, y, twin_y, dt):
     a, a_twin = y[law.output], twin_y[law.output]
     if np.isnan(a):
         return 0.0
+    is_elsewhere = False
     if law.compensation > 0.0:
-        a_twin -= law.compensation * _lead(y, twin_y)
+        lead, count = _lead(y, twin_y)
+        a_twin -= law.compensation * lead
+        if law.largest_compensation < np.inf:
+            is_elsewhere = count == 0 or law.compensation * abs(lead) > law.largest_compensation
     if law.differentiated:
         if memory[BEGUN] == 0.0:
             memory[BEGUN] = 1.0
@@ -305,7 +317,7 @@ def advance_law(law, memory, y, twin_y, dt):
     least = law.least_wheel_speed
     if least > 0.0 and not (_moving(y, least) and _moving(twin_y, least)):
         return 0.0
-    if abs(instrument) < law.least_signal:
+    if is_elsewhere or abs(instrument) < law.least_signal:
         return 0.0
     if law.largest_yaw_rate < np.inf and not abs(y[_YAW_RATE]) <= law.largest_yaw_rate:
         return 0.0

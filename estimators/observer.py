@@ -325,7 +325,9 @@ def _parameter_laws(laws, memory, dt):
     """Corrects memory.p: TiL Eq. (5)."""
     for k in range(laws.size):
         law = laws[k]
-        memory.p[law.parameter] += advance_law(law, memory.laws[k], memory.seen, memory.y, dt)
+        p = memory.p[law.parameter]
+        p += advance_law(law, memory.laws[k], memory.seen, memory.y, dt)
+        memory.p[law.parameter] = min(max(p, -law.largest), law.largest)
         if memory.laws[k, JUMPED] > 0.0:
             memory.unsettled[0] = SETTLING
 

@@ -80,13 +80,11 @@ def load_snapshot(path: str | Path, observer: Observer) -> dict[str, Array]:
 
 def _read(path: Path) -> dict[str, Array]:
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise TwinError(f"{path}: is no snapshot of an observer")
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise TwinError(f"{path}: no such snapshot") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError, AttributeError) as error:
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise TwinError(f"{path}: is no snapshot of an observer, or broken: {reason}") from None
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from estimators.observer import Observer
@@ -176,11 +177,9 @@ class Stream:
         if math.isnan(self._time):
             inputs, measurements = u[None], y[None]
         else:
-            times = np.array([self._time, time])
-            slack = _SLACK * twin.dt
-            inputs, measurements = between(
-                due, times, np.stack([self._u, u]), np.stack([self._y, y]), slack
-            )
+            times, both_u = np.array([self._time, time]), np.array([self._u, u])
+            both_y = np.array([self._y, y])
+            inputs, measurements = between(due, times, both_u, both_y, _SLACK * twin.dt)
         for row_u, row_y in zip(inputs, measurements, strict=True):
             states = twin.read_states()
             p = self.observer.update(row_u, row_y)
@@ -188,9 +187,8 @@ class Stream:
         return Sample(float(due[-1]), p, states, self.observer.trustworthy)
 
 
-def between(
-    at: Array, time: Array, inputs: Array, measurements: Array, slack: float
-) -> tuple[Array, Array]:
+@njit(cache=True)
+def between(at, time, inputs, measurements, slack):
     """Inputs and measurements at other times: linear, but held and missing across gaps.
 
     Args:
@@ -203,27 +201,24 @@ def between(
     Returns:
         (m, nu) and (m, ny).
     """
-    after = np.clip(np.searchsorted(time, at - slack), 1, time.size - 1)
-    before = after - 1
-    steps = time[after] - time[before]
-    share = np.clip((at - time[before]) / steps, 0.0, 1.0)
-    share[at > time[after] - slack] = 1.0
-    share[at < time[before] + slack] = 0.0
-    bridged = steps > LONGEST_STEP
-    held = np.where(bridged & (share < 1.0), 0.0, share)[:, None]
-    u = inputs[before] + held * (inputs[after] - inputs[before])
-    w = share[:, None]
-    # a sample's own value counts even where its neighbour is missing
-    y = np.where(
-        w == 1.0,
-        measurements[after],
-        np.where(
-            w == 0.0,
-            measurements[before],
-            measurements[before] + w * (measurements[after] - measurements[before]),
-        ),
-    )
-    y[bridged & (share > 0.0) & (share < 1.0)] = np.nan
+    u = np.empty((at.size, inputs.shape[1]))
+    y = np.empty((at.size, measurements.shape[1]))
+    after = 1
+    for k in range(at.size):
+        while after < time.size - 1 and at[k] > time[after] + slack:
+            after += 1
+        before, step = after - 1, time[after] - time[after - 1]
+        # a sample's own value counts even where its neighbour is missing
+        if at[k] > time[after] - slack:
+            u[k], y[k] = inputs[after], measurements[after]
+        elif at[k] < time[before] + slack:
+            u[k], y[k] = inputs[before], measurements[before]
+        elif step > LONGEST_STEP:
+            u[k], y[k] = inputs[before], np.nan
+        else:
+            share = (at[k] - time[before]) / step
+            u[k] = inputs[before] + share * (inputs[after] - inputs[before])
+            y[k] = measurements[before] + share * (measurements[after] - measurements[before])
     return u, y
 
 

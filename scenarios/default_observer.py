@@ -25,6 +25,8 @@ NOISE_DENSITY = 0.03  # [m/s2 over root of Hz]: an IMU of 1 m/s2 at 1 kHz; chose
 DRIFT = 0.2  # [kg over root of s]: 2 kg in two minutes; chosen
 OFFSET_SD = 0.3  # [m/s2]: 2 degrees of slope or a poor IMU; chosen
 LEAST_ACCELERATION = 0.5  # [m/s2]; below it drag and slopes weigh more than the mass; chosen
+LARGEST_COMPENSATION = 1.0  # [m/s2]: three times what a full car needs in town; chosen
+LARGEST_SHARE = 0.6  # of the vehicle's mass, that a load adds or takes; chosen
 LARGEST_YAW_RATE = math.radians(3.0)  # TiL Eq. (24)
 
 
@@ -80,6 +82,7 @@ def mass_law(twin: Twin, radius: float, measured: Set[str]) -> ParameterLaw:
     """The law of the mass for a car, whose wheels roll at a radius [m]."""
     car = twin.car
     mass = float(car.nominal[0] + car.other_mass[0])
+    wheels = any(f"wheel_speed_{wheel}" in measured for wheel in WHEELS)
     share = float(np.mean(car.spin_inertia)) / (radius * mass)
     return ParameterLaw(
         parameter="mass",
@@ -92,5 +95,7 @@ def mass_law(twin: Twin, radius: float, measured: Set[str]) -> ParameterLaw:
         offset_jump=OFFSET_SD,
         least_signal=LEAST_ACCELERATION,
         largest_yaw_rate=LARGEST_YAW_RATE if "yaw_rate" in measured else math.inf,
-        compensation=WHEEL_SPEED * share,
+        compensation=WHEEL_SPEED * share if wheels else 0.0,
+        largest_compensation=LARGEST_COMPENSATION,
+        largest=LARGEST_SHARE * mass,
     )

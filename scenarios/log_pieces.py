@@ -64,8 +64,8 @@ def measured(pieces: Sequence[Drive]) -> set[str]:
         finite = np.isfinite(piece.measurements).any(axis=0)
         names |= {name for name, there in zip(piece.output_names, finite, strict=True) if there}
         moving = np.ptp(piece.inputs, axis=0) > 0.0
-        if "log" not in piece.settings:  # a drive of ours: what is there was measured
-            moving |= [name not in TORQUES for name in piece.input_names]
+        declared = (*TORQUES, *piece.settings.get("log", {}).get("constants", ()))
+        moving |= [name not in declared for name in piece.input_names]
         names |= {name for name, there in zip(piece.input_names, moving, strict=True) if there}
     if any(name in names for name in TORQUES):
         names |= set(TORQUES)  # a driven axle alone says as much
