@@ -21,6 +21,8 @@ class Estimate:
         outputs: (N, ny) what the twin's sensors showed.
         extended: (N, ne) what else the twin computed: forces and slips of its tyres.
         nominal: (np,) the twin's own chassis, without deltas; NaN where a black box does not tell.
+        trustworthy: (N,) false where the guard rejected or missed a measurement in use, and for a
+            while after; None where an estimator has no guard.
         state_names, parameter_names, output_names, extended_names: of the columns; by default
             those of a car.
     """
@@ -31,6 +33,7 @@ class Estimate:
     outputs: Array
     extended: Array
     nominal: Array
+    trustworthy: NDArray[np.bool_] | None = None
     state_names: tuple[str, ...] = STATES
     parameter_names: tuple[str, ...] = PARAMETERS
     output_names: tuple[str, ...] = OUTPUTS

@@ -14,7 +14,19 @@ mass, and a correction has the form
 * the *form*: "sign", z = sgn(.), with a constant gain as in the paper; or "least-squares", z = the
   signal itself with the gains of a recursive least-squares fit with forgetting: the Kalman filter
   of e = (a~ / scale) missing + offset + noise. The offset, a bias of the sensor or gravity seen by
-  a car that stands otherwise than its twin, is fitted along: it does not pull the parameter.
+  a car that stands otherwise than its twin, is fitted along: it does not pull the parameter. Where
+  it may jump, a sensor that is knocked or a hill that begins, the residual's mean over 0.2 s tells,
+  which no change of the parameter could make as suddenly, and the offset is fitted anew. The
+  form "integral", z = -1, is for a parameter that is itself a force: its gain has either sign, and
+  what it has gathered may leak away again.
+
+Laws may rest: at yaw rates beyond a gate (Eq. (24)), or where the instrument is too small to tell
+anything but the errors of the model.
+
+An observer that corrects the wheel speeds pulls on its twin: a correction K (w - w~) is a torque
+I K (w - w~) on the wheel, which the tyre hands on to the road. The twin's speed then settles where
+a~ = a whatever its mass, and hides it. *Compensation* takes that acceleration,
+sum K (w - w~) I / (R M), out of the twin's signal before anything is made of it.
 
 Two more make a regressor of a better signal:
 
@@ -30,7 +42,7 @@ Two more make a regressor of a better signal:
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numba import njit
@@ -39,6 +51,7 @@ from numpy.typing import NDArray
 from twin import OUTPUTS, PARAMETERS, TwinError
 
 Array = NDArray[np.float64]
+Form = Literal["sign", "least-squares", "integral"]
 
 # Signals that a law can use: what the sensors give, and accelerations [m/s2, rad/s2]. These come
 # from a measured rate by the same causal filter for vehicle and twin, s / (filter_time s + 1)^2: it
@@ -50,14 +63,20 @@ ACCELERATIONS = {
     "yaw_acceleration": "yaw_rate",
 }
 SIGNALS = (*OUTPUTS, *ACCELERATIONS)
+_YAW_RATE = OUTPUTS.index("yaw_rate")
 _WHEEL_SPEEDS = OUTPUTS[6:]
 
 # Columns of a law's memory: covariance of parameter and offset, and the offset itself
 PP, PO, OO, OFFSET = range(4)
+ADDED = OFFSET  # by a law of the integral form, all in all
 # and of the differentiating filter: whether it has begun, its two stages for vehicle and for twin
 BEGUN, FILTER = 4, 5
-# of the mode's filter, position and speed; and the place in the ring of lagged instruments
-MODE, PLACE, RING = 9, 11, 12
+# of the mode's filter, position and speed; the residual's short mean, and whether it told of a jump
+# of the offset; and the place in the ring of lagged instruments
+MODE, MEAN, JUMPED, PLACE, RING = 9, 11, 12, 13, 14
+
+JUMP_TIME = 0.2  # [s] of the residual's short mean; chosen
+JUMP = 4.0  # standard deviations of it that are no noise; chosen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,27 +98,44 @@ class ParameterLaw:
         noise_density: of the least-squares form, of the signal's noise [unit of the signal over
             the root of Hz]: standard deviation times the root of the sample time.
         drift: of the least-squares form, of the parameter [unit over the root of s]: forgetting.
+        leak: of the integral form, of what the law itself has added [1/s].
         offset_sd: of the least-squares form, of the signal's offset; zero: there is none.
+        offset_jump: of the least-squares form, the same after a jump of the offset, see the module;
+            zero: it does not jump.
         filter_time: of the differentiating filter [s]; only `ACCELERATIONS` have one.
         least_wheel_speed: the law rests while vehicle or twin is slower [rad/s]: a car held by its
             brakes tells nothing of its mass.
+        largest_yaw_rate: the law rests while the measured one is larger [rad/s], TiL Eq. (24).
+        least_signal: the law rests while the instrument is smaller.
+        compensation: of the twin's signal, what it gets for each rad/s by which a wheel of the
+            vehicle is ahead of the twin's: gain on wheel speeds times I / (R M), see the module.
+        largest_compensation: the law rests while it gets more, or no wheel tells: its twin is
+            elsewhere, and what the tyres hand on is limited.
+        largest: of the parameter, in either direction: what is physical.
     """
 
     parameter: str
     signal: str
     instrument: Literal["measured", "twin"] = "twin"
-    form: Literal["sign", "least-squares"] = "least-squares"
+    form: Form = "least-squares"
     gain: float = 0.0
     scale: float = 1.0
     prior_sd: float = 1.0
     noise_density: float = 1.0
     drift: float = 0.0
+    leak: float = 0.0
     offset_sd: float = 0.0
+    offset_jump: float = 0.0
     filter_time: float = 0.02
     mode_frequency: float = 0.0
     mode_damping: float = 0.5
     lag: float = 0.0
     least_wheel_speed: float = 0.0
+    largest_yaw_rate: float = math.inf
+    least_signal: float = 0.0
+    compensation: float = 0.0
+    largest_compensation: float = math.inf
+    largest: float = math.inf
 
     def __post_init__(self) -> None:
         """Checks names and numbers."""
@@ -107,18 +143,23 @@ class ParameterLaw:
             ("parameter", self.parameter, PARAMETERS),
             ("signal", self.signal, SIGNALS),
             ("instrument", self.instrument, ("measured", "twin")),
-            ("form", self.form, ("sign", "least-squares")),
+            ("form", self.form, get_args(Form)),
         ):
             if name not in allowed:
                 raise TwinError(f"law: {kind} is {name!r}; allowed: {', '.join(allowed)}")
         if self.scale == 0.0 or not math.isfinite(self.scale):
             raise TwinError(f"law: scale is {self.scale}; allowed: any number but 0")
+        if not math.isfinite(self.gain) or (self.gain < 0.0 and self.form != "integral"):
+            raise TwinError(f"law: gain is {self.gain}; allowed: 0 or more, finite")
         for name in (
-            *("gain", "drift", "offset_sd", "least_wheel_speed"),
-            *("mode_frequency", "mode_damping", "lag"),
+            *("drift", "leak", "offset_sd", "offset_jump", "least_wheel_speed", "least_signal"),
+            *("mode_frequency", "mode_damping", "lag", "compensation"),
         ):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: 0 or more")
+        for name in ("largest_yaw_rate", "largest_compensation", "largest"):
+            if not getattr(self, name) > 0.0:
+                raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
         for name in ("prior_sd", "noise_density", "filter_time"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
@@ -129,6 +170,14 @@ class ParameterLaw:
         return ACCELERATIONS.get(self.signal, self.signal)
 
 
+FORMS = get_args(Form)
+SIGN, LEAST_SQUARES, INTEGRAL = range(len(FORMS))
+# Fields that compiled code takes as they are
+_COPIED = (
+    *("gain", "scale", "drift", "leak", "offset_jump", "filter_time", "mode_damping"),
+    *("least_wheel_speed", "largest_yaw_rate", "least_signal", "compensation"),
+    *("largest_compensation", "largest"),
+)
 # A law as compiled code sees it. A record goes into a function as one pointer; a tuple of arrays
 # would cost more than the law.
 LAW_DTYPE = np.dtype(
@@ -137,16 +186,23 @@ LAW_DTYPE = np.dtype(
         ("output", np.int64),
         ("differentiated", np.bool_),
         ("measured", np.bool_),
-        ("sign", np.bool_),
+        ("form", np.int64),  # place in `FORMS`
         ("gain", np.float64),
         ("scale", np.float64),
         ("intensity", np.float64),  # noise_density squared
         ("drift", np.float64),
+        ("leak", np.float64),
+        ("offset_jump", np.float64),
         ("filter_time", np.float64),
         ("mode_frequency", np.float64),  # [rad/s]
         ("mode_damping", np.float64),
         ("lag", np.int64),  # samples
         ("least_wheel_speed", np.float64),
+        ("largest_yaw_rate", np.float64),
+        ("least_signal", np.float64),
+        ("compensation", np.float64),
+        ("largest_compensation", np.float64),
+        ("largest", np.float64),
     ],
     align=True,
 )
@@ -173,13 +229,13 @@ def compile_laws(
         _check_names(law, outputs, parameters)
     table = np.zeros(len(laws), LAW_DTYPE)
     for row, law in zip(table, laws, strict=True):
-        for name in ("gain", "scale", "drift", "filter_time", "mode_damping", "least_wheel_speed"):
+        for name in _COPIED:
             row[name] = getattr(law, name)
         row["parameter"] = parameters.index(law.parameter)
         row["output"] = outputs.index(law.output)
         row["differentiated"] = law.signal in ACCELERATIONS
         row["measured"] = law.instrument == "measured"
-        row["sign"] = law.form == "sign"
+        row["form"] = FORMS.index(law.form)
         row["intensity"] = law.noise_density**2
         row["mode_frequency"] = 2.0 * math.pi * law.mode_frequency
         row["lag"] = round(law.lag / dt)
@@ -197,10 +253,16 @@ def _check_names(law: ParameterLaw, outputs: tuple[str, ...], parameters: tuple[
     ):
         if name not in allowed:
             raise TwinError(f"law: {kind} is {name!r}; this black box allows: {', '.join(allowed)}")
-    if law.least_wheel_speed > 0.0 and outputs[6:] != _WHEEL_SPEEDS:
+    for name in ("least_wheel_speed", "compensation"):
+        if getattr(law, name) > 0.0 and outputs[6:] != _WHEEL_SPEEDS:
+            raise TwinError(
+                f"law: {name} is {getattr(law, name)}; this black box, without wheel speeds, "
+                "allows: 0"
+            )
+    if law.largest_yaw_rate < math.inf and outputs[5:6] != ("yaw_rate",):
         raise TwinError(
-            f"law: least_wheel_speed is {law.least_wheel_speed}; this black box, without wheel "
-            "speeds, allows: 0"
+            f"law: largest_yaw_rate is {law.largest_yaw_rate}; this black box, without a yaw rate, "
+            "allows: inf"
         )
 
 
@@ -208,6 +270,20 @@ def _check_names(law: ParameterLaw, outputs: tuple[str, ...], parameters: tuple[
 def _moving(y, least):
     """Whether the mean of the wheel speeds is at least so much [rad/s]."""
     return y[6] + y[7] + y[8] + y[9] >= 4.0 * least
+
+
+@njit(cache=True)
+def _lead(y, twin_y):
+    """By how much the vehicle's wheels are ahead of the twin's, summed [rad/s], and how many tell.
+
+    A wheel speed that is not measured has not been corrected either.
+    """
+    lead, count = 0.0, 0
+    for i in range(6, 10):
+        if not np.isnan(y[i]):
+            lead += y[i] - twin_y[i]
+            count += 1
+    return lead, count
 
 
 @njit(cache=True)
@@ -224,6 +300,12 @@ def advance_law(law, memory, y, twin_y, dt):
     a, a_twin = y[law.output], twin_y[law.output]
     if np.isnan(a):
         return 0.0
+    is_elsewhere = False
+    if law.compensation > 0.0:
+        lead, count = _lead(y, twin_y)
+        a_twin -= law.compensation * lead
+        if law.largest_compensation < np.inf:
+            is_elsewhere = count == 0 or law.compensation * abs(lead) > law.largest_compensation
     if law.differentiated:
         if memory[BEGUN] == 0.0:
             memory[BEGUN] = 1.0
@@ -235,8 +317,18 @@ def advance_law(law, memory, y, twin_y, dt):
     least = law.least_wheel_speed
     if least > 0.0 and not (_moving(y, least) and _moving(twin_y, least)):
         return 0.0
-    if law.sign:
+    if is_elsewhere or abs(instrument) < law.least_signal:
+        return 0.0
+    if law.largest_yaw_rate < np.inf and not abs(y[_YAW_RATE]) <= law.largest_yaw_rate:
+        return 0.0
+    if law.form == SIGN:
         return law.gain * dt * np.sign(instrument) * (a_twin - a)
+    if law.form == INTEGRAL:
+        added = dt * (law.gain * (a - a_twin) - law.leak * memory[ADDED])
+        memory[ADDED] += added
+        return added
+    if law.offset_jump > 0.0:
+        _watch_offset(law, memory, instrument / law.scale, a_twin - a, dt)
     noise, growth = law.intensity / dt, law.drift * law.drift * dt
     return _fit(memory, instrument / law.scale, a_twin - a, noise, growth)
 
@@ -265,6 +357,19 @@ def _differentiate(memory, stage, value, filter_time, dt):
     change = decay * (memory[stage] - memory[stage + 1])
     memory[stage + 1] += change
     return change / dt
+
+
+@njit(cache=True)
+def _watch_offset(law, memory, regressor, innovation, dt):
+    """Opens the offset anew where the residual's short mean is more than noise and doubt allow."""
+    share = min(dt / JUMP_TIME, 1.0)
+    memory[MEAN] += share * (innovation - memory[OFFSET] - memory[MEAN])
+    doubt = memory[PP] * regressor**2 + 2.0 * memory[PO] * regressor + memory[OO]
+    memory[JUMPED] = 0.0
+    if memory[MEAN] ** 2 > JUMP**2 * (0.5 * law.intensity / JUMP_TIME + doubt):
+        memory[JUMPED] = 1.0
+        memory[OO] += law.offset_jump**2
+        memory[MEAN] = 0.0
 
 
 @njit(cache=True)

@@ -13,10 +13,11 @@ from typing import Any
 import click
 
 from scenarios import catalogue
-from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Scenario, Settings
+from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Scenario, Settings, Tuning
 from scenarios.options import (
     STANDARD_OUTPUT,
     Name,
+    Names,
     OutputFile,
     count_option,
     dask_option,
@@ -33,11 +34,11 @@ from scenarios.result import Result, json_text, write_json
 def main(args: Sequence[str] | None = None) -> int:
     """Runs a command; returns the exit status."""
     try:
-        program.main(args, prog_name="til", standalone_mode=False)
+        status = program.main(args, prog_name="til", standalone_mode=False)
     except click.ClickException as error:
         click.echo("til: " + " ".join(_message(error).split()), err=True)
         return error.exit_code
-    return 0
+    return status if isinstance(status, int) else 0
 
 
 def _message(error: click.ClickException) -> str:
@@ -103,6 +104,15 @@ def list_() -> None:
 @click.option(
     "--rrd", type=OutputFile(suffix=".rrd"), metavar="FILE", help="Write the Rerun timeline."
 )
+@click.option(
+    "--gains",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Gains of the default estimator, as `til tune` writes them.",
+)
+@click.option(
+    "--png", type=OutputFile(suffix=".png"), metavar="FILE", help="Draw the scenario's picture."
+)
 @click.option("--view", is_flag=True, help="Show the timeline in a window until it is closed.")
 @dask_option
 @json_option
@@ -114,6 +124,8 @@ def run(
     jobs: int,
     duration: float | None,
     rrd: Path | None,
+    gains: Path | None,
+    png: Path | None,
     view: bool,
     dask: str | None,
     json_path: Path | None,
@@ -130,12 +142,17 @@ def run(
         seeds=tuple(range(seed, seed + seeds)),
         jobs=jobs,
         duration=duration,
+        gains=gains,
     )
+    if gains and not scenario.takes_gains:
+        raise Mistake(f"--gains: {name} takes none; allowed: laps, lane-change")
     with cluster(dask):
         result = scenario.run(settings)
     _report(result, json_path)
     if rrd:
         scenario.timeline(settings, rrd)
+    if png:
+        scenario.picture(settings, png)
     if view:
         _view(scenario, settings, rrd)
 
@@ -218,18 +235,41 @@ def limits(name: str, snr: float | None, duration: float | None, json_path: Path
 @click.option(
     "--out", type=OutputFile(suffix=".toml"), metavar="FILE", help="[default: out/tune-NAME.toml]"
 )
+@click.option(
+    "--bounds",
+    "bounds",
+    type=(str, float, float),
+    multiple=True,
+    metavar="GAIN LOW HIGH",
+    help="Look for a gain within other bounds than its own; may be given several times.",
+)
+@click.option("--cost", default="", help="What is minimised: robust or, where it has one, paper.")
 @json_option
 def tune(
-    name: str, estimator: str, evaluations: int, jobs: int, out: Path | None, json_path: Path | None
+    name: str,
+    estimator: str,
+    evaluations: int,
+    jobs: int,
+    out: Path | None,
+    bounds: Sequence[tuple[str, float, float]],
+    cost: str,
+    json_path: Path | None,
 ) -> None:
     """Choose the gains of an estimator of scenario NAME, on seeds that no result is reported on.
 
-    Bayesian optimisation; FILE holds the best point tried and the one predicted best.
+    Bayesian optimisation, in batches of four; FILE holds the best point tried and the one predicted
+    best. A tuning that was interrupted goes on from the journal beside FILE.
     """
-    path = out or Path("out", f"tune-{name}.toml")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    result = catalogue.scenario(name).tune(estimator, evaluations, jobs, path)
-    _report(result, json_path)
+    tuning = Tuning(
+        estimator=estimator,
+        evaluations=evaluations,
+        jobs=jobs,
+        path=out or Path("out", f"tune-{name}.toml"),
+        bounds={gain: (low, high) for gain, low, high in bounds},
+        cost=cost,
+    )
+    tuning.path.parent.mkdir(parents=True, exist_ok=True)
+    _report(catalogue.scenario(name).tune(tuning), json_path)
 
 
 @program.command()
@@ -251,6 +291,129 @@ def inspect(log: Path, map_path: Path | None) -> None:
 def new_car(name: str) -> None:
     """Write NAME.toml, a commented description of a car to fill in."""
     click.echo(f"{catalogue.new_car()(name)} describes a car: change what you know of yours.")
+
+
+@program.command()
+@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, or an MJCF file.")
+@click.option("--free", required=True, type=Names(), metavar="NAME,...", help="What is fitted.")
+@click.option(
+    "--fit",
+    "signals",
+    type=Names(),
+    metavar="NAME,...",
+    default="ay,yaw_rate",
+    show_default=True,
+    help="Signals that the twin is to show as the log does; sideslip is that of the log's truth.",
+)
+@click.option("--from", "first", type=float, metavar="S", help="First time used.")
+@click.option("--to", "last", type=float, metavar="S", help="Last time used.")
+@count_option("--evaluations", 20, "How many steps at most.")
+@jobs_option
+@click.option(
+    "--out", type=OutputFile(suffix=".toml"), metavar="FILE", help="[default: out/calibrate.toml]"
+)
+@json_option
+def calibrate(
+    log: Path,
+    vehicle: str,
+    free: tuple[str, ...],
+    signals: tuple[str, ...],
+    first: float | None,
+    last: float | None,
+    evaluations: int,
+    jobs: int,
+    out: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Fit the twin of a car to LOG, a recorded drive, by bounded least squares.
+
+    FILE holds values, their 95 % confidence intervals and where they come from. A factor of 1 and a
+    delta or offset of 0 are what the car's files say. Where the log has no torques the twin
+    follows its measured vx, and the mass is not observable.
+    """
+    path = out or Path("out", "calibrate.toml")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    calibration = catalogue.calibrate()
+    task = calibration.task_of(log, vehicle, free, signals, (first, last))
+    _report(calibration.run(task, log, path, jobs=jobs, evaluations=evaluations), json_path)
+
+
+@program.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True)
+@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, MJCF or TOML file.")
+@click.option(
+    "--map",
+    "map_path",
+    type=click.Path(path_type=Path),
+    metavar="MAP.toml",
+    help="Which channels of the logs are ours; a drive of ours needs none.",
+)
+@click.option(
+    "--estimator",
+    "estimators",
+    type=click.Choice(["til", "joint"]),
+    multiple=True,
+    default=("til",),
+    show_default=True,
+    help="til: states, sideslip and mass; joint: all load parameters, tyres, springs. Repeatable.",
+)
+@jobs_option
+@dask_option
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    default="out",
+    show_default=True,
+    help="Folder for timelines, histories and finished results; every job must reach it.",
+)
+@click.option(
+    "--state",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Of a stream: go on where FILE was left, and leave it again at the end.",
+)
+@json_option
+def estimate(
+    logs: tuple[str, ...],
+    vehicle: str,
+    map_path: Path | None,
+    estimators: tuple[str, ...],
+    jobs: int,
+    dask: str | None,
+    out: Path,
+    state: Path | None,
+    json_path: Path | None,
+) -> int:
+    """Observe recorded drives: LOG is Parquet, CSV or MDF 4, or - for standard input.
+
+    Of each LOG DIR receives NAME.ESTIMATOR.rrd, the timeline; .parquet, the estimates over time;
+    and .json, the result. A second call skips what is finished there, unless the log, the map, the car
+    or a version has changed. Truth in a log is only scored against. A bad log does not stop the
+    others; the exit status is then 2.
+
+    From standard input come samples, one JSON object a line or CSV with a row of names: time [s],
+    inputs and measurements by our names or the map's, at any rate. Estimates go to standard output
+    as they come, one JSON object a line.
+    """
+    from scenarios.progress import cluster  # not at the top: it imports joblib
+
+    if "-" in logs:
+        if len(logs) > 1 or json_path or estimators != ("til",) or dask:
+            raise Mistake("estimate: a stream, -, stands alone; allowed: --map, --vehicle, --state")
+        return catalogue.estimate_stream().run(vehicle, map_path, state)
+    if state:
+        raise Mistake("--state: is that of a stream; allowed: LOG is -")
+    with cluster(dask):
+        result, text, bad = catalogue.estimate().run(
+            [Path(log) for log in logs],
+            vehicle=vehicle, map_path=map_path, estimators=estimators, jobs=jobs, out=out,
+        )  # fmt: skip
+    _report(result, json_path, f"{text}\n\n{result.table()}" if result.rows else text)
+    for line in bad:
+        click.echo(f"til: {line}", err=True)
+    return 2 if bad else 0
 
 
 @program.command()

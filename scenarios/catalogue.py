@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from scenarios.result import Result
 
@@ -25,12 +26,40 @@ class Settings:
         seeds: one run each.
         jobs: processes side by side.
         duration: of the drive [s]; None: all of it.
+        gains: file of the default estimator's gains; None: those of the project.
     """
 
     snr: float
     seeds: tuple[int, ...]
     jobs: int
     duration: float | None
+    gains: Path | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tuning:
+    """How gains are chosen.
+
+    Attributes:
+        estimator: whose.
+        evaluations: points to try.
+        jobs: evaluations side by side.
+        path: of the TOML file with the gains; the journal lies beside it.
+        bounds: of gains by name, where they are not to be the estimator's own.
+        cost: by name; empty: the scenario's own.
+    """
+
+    estimator: str
+    evaluations: int
+    jobs: int
+    path: Path
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    cost: str = ""
+
+    @property
+    def journal(self) -> Path:
+        """What an interrupted tuning goes on from."""
+        return self.path.with_suffix(".journal")
 
 
 def _without_limits(*_: object) -> NoReturn:
@@ -45,6 +74,12 @@ def _without_gains(*_: object) -> NoReturn:
     raise TwinError("tune: this scenario has no gains to choose; allowed: one of a car")
 
 
+def _without_picture(*_: object) -> NoReturn:
+    from twin.errors import TwinError  # not at the top: it imports NumPy
+
+    raise TwinError("run: this scenario draws no picture; allowed: --png with ferrari")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """What a scenario's module offers as `SCENARIO`.
@@ -56,7 +91,9 @@ class Scenario:
         vehicle: the twin's, by its name in `models`.
         default_snr: signal-to-noise ratio unless the user names one [dB]; NaN: it takes none.
         drive: of the real vehicle, without noise; by default `til limits` says it has none.
-        tune: chooses gains from (estimator, evaluations, jobs, TOML file to write).
+        tune: chooses gains and writes them to a file.
+        takes_gains: whether it heeds `Settings.gains`.
+        picture: draws the run as PNG to the given path, whole or not at all.
         variation: by parameter what its load changes, around the twin's vehicle; as `drive`.
     """
 
@@ -66,7 +103,9 @@ class Scenario:
     default_snr: float = math.nan
     drive: Callable[[Settings], Drive] = _without_limits
     variation: Callable[[], Mapping[str, float]] = _without_limits
-    tune: Callable[[str, int, int, Path], Result] = _without_gains
+    takes_gains: bool = False
+    tune: Callable[[Tuning], Result] = _without_gains
+    picture: Callable[[Settings, Path], None] = _without_picture
 
 
 Reproduction = Callable[[int, int, Path], Result]
@@ -95,8 +134,17 @@ SCENARIOS = {
         "scenarios.roll_yaw:SCENARIO", "a swept steer tells the roll and yaw inertia"
     ),
     "pitch": Entry("scenarios.pitch:SCENARIO", "a rough road tells the pitch inertia"),
+    "laps": Entry(
+        "scenarios.laps:LAPS", "a sports car on a circuit: sideslip and mass at its limits"
+    ),
+    "lane-change": Entry(
+        "scenarios.laps:LANE_CHANGE", "double lane changes and braking: sideslip and mass"
+    ),
     "truck": Entry(
         f"{_TRUCK}:SCENARIO", "a truck's load changes twice: Kalman-Bucy filters beside TiL"
+    ),
+    "ferrari": Entry(
+        "scenarios.ferrari:SCENARIO", "a measured lap: the sideslip of a Ferrari 250 LM"
     ),
 }
 
@@ -154,3 +202,18 @@ def inspection() -> Callable[[Path, Path | None], str]:
 def new_car() -> Callable[[str], Path]:
     """What writes the description of a new car of that name, and returns its path."""
     return pkgutil.resolve_name("twin.car_file:write_template")
+
+
+def calibrate() -> Any:
+    """The module that fits a twin to a log."""
+    return import_module("scenarios.calibrate")
+
+
+def estimate() -> Any:
+    """The module that observes recorded drives."""
+    return import_module("scenarios.estimate")
+
+
+def estimate_stream() -> Any:
+    """The module that observes samples from standard input."""
+    return import_module("scenarios.estimate_stream")

@@ -28,6 +28,18 @@ class Name(click.ParamType):
         return value
 
 
+class Names(click.ParamType):
+    """Names with commas between them."""
+
+    name = "names"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """The names."""
+        return tuple(name.strip() for name in value.split(",") if name.strip())
+
+
 class OutputFile(click.Path):
     """A file that can be written, which is tried before the long run."""
 

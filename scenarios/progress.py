@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar, cast
+from typing import NoReturn, TypeVar, cast
 
 import joblib
 from tqdm import tqdm
@@ -19,17 +19,24 @@ def progress(items: Iterable[Item], label: str, total: int | None = None) -> Ite
     yield from tqdm(items, label, total, leave=False, delay=DELAY, disable=None)
 
 
+def bar(label: str, total: int) -> "tqdm[NoReturn]":
+    """A bar that the caller moves on, shown as that of `progress`."""
+    return tqdm(desc=label, total=total, leave=False, delay=DELAY, disable=None)
+
+
 def parallel(
     function: Callable[[Item], Output], items: Iterable[Item], jobs: int, label: str
 ) -> list[Output]:
     """The function of each item, in their order, by so many jobs side by side.
+
+    Without a label there is no bar.
 
     No backend is named: one chosen with `joblib.parallel_config` (Dask, Ray) takes over.
     """
     items = list(items)
     run = joblib.Parallel(n_jobs=jobs, return_as="generator")
     outputs = cast(Iterator[Output], run(joblib.delayed(function)(item) for item in items))
-    return list(progress(outputs, label, len(items)))
+    return list(progress(outputs, label, len(items)) if label else outputs)
 
 
 @contextmanager

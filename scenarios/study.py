@@ -18,7 +18,7 @@ from estimators.estimate import Estimate
 from estimators.law import ParameterLaw
 from estimators.observer import Observer
 from estimators.score import rms_pct, settling_time
-from scenarios.catalogue import Scenario, Settings
+from scenarios.catalogue import Scenario, Settings, Tuning
 from scenarios.limits import law_limit, percent, sensitivity_at_truth
 from scenarios.progress import parallel
 from scenarios.record import Manoeuvre, record
@@ -312,10 +312,10 @@ def scenario(study: Study) -> Scenario:
             title=study.name,
         )
 
-    def tune(estimator: str, evaluations: int, jobs: int, path: Path) -> Result:
-        from scenarios import tune  # not at the top: it is built on this module
+    def tune(tuning: Tuning) -> Result:
+        from scenarios import tune_laws  # not at the top: it is built on this module
 
-        return tune.run(study, estimator, evaluations, jobs, path)
+        return tune_laws.run(study, tuning)
 
     return Scenario(
         run=run,

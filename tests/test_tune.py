@@ -1,61 +1,192 @@
+"""The search, on bowls instead of drives; and what the studies tune."""
+
+import math
 import tomllib
 
-import numpy as np
 import pytest
 
-from scenarios import mass, roll_yaw, tune
+from scenarios import mass, roll_yaw, tune, tune_laws, tune_states
+from scenarios.catalogue import Tuning
+from scenarios.tune import Gain, Objective
 from twin import TwinError
 
+GAINS = (
+    Gain(name="a", low=1.0, high=1e4, today=5.0),
+    Gain(name="b", low=1.0, high=1e4, today=5.0),
+)
 
-def test_gains_are_put_where_they_belong():
+
+def bowl(gains):
+    return sum((math.log10(x) - 2.0) ** 2 for x in gains.values()) + 0.5
+
+
+class Interrupted(Exception):
+    pass
+
+
+def objective(cost=bowl, gains=GAINS, worst=1e3):
+    return Objective(name="bowl", gains=gains, cost=cost, metric="depth", unit="1", worst=worst)
+
+
+def interrupted_after(calls):
+    """A bowl that somebody breaks off."""
+    left = [calls]
+
+    def cost(gains):
+        if left[0] == 0:
+            raise Interrupted
+        left[0] -= 1
+        return bowl(gains)
+
+    return cost
+
+
+def test_search_finds_the_bottom_and_tells_tried_from_predicted(tmp_path):
+    found = tune.search(objective(), 24, 1, tmp_path / "journal")
+    assert found.cost == pytest.approx(bowl(found.evaluated))
+    assert found.cost < 0.55
+    assert found.predicted["a"] == pytest.approx(100.0, rel=0.5)
+    assert found.evaluations == 24
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupted_search_goes_on_to_the_same_result(tmp_path):
+    journal = tmp_path / "journal"
+    whole = tune.search(objective(), 24, 1, journal)
+    with pytest.raises(Interrupted):
+        tune.search(objective(interrupted_after(18)), 24, 1, journal)
+    before = journal.read_text()
+    with journal.open("a") as file:
+        file.write('{"costs": [1.0,')  # cut off while it was written
+    assert len(before.splitlines()) == 1 + 18 // tune.BATCH
+    calls = []
+    resumed = tune.search(objective(lambda g: calls.append(g) or bowl(g)), 24, 1, journal)
+    assert resumed == whole
+    assert len(calls) == 24 - 18 // tune.BATCH * tune.BATCH
+
+
+def test_journal_of_another_tuning_is_refused(tmp_path):
+    journal = tmp_path / "journal"
+    with pytest.raises(Interrupted):
+        tune.search(objective(interrupted_after(4)), 8, 1, journal)
+    other = (Gain(name="a", low=1.0, high=1e5, today=5.0), GAINS[1])
+    with pytest.raises(TwinError, match="journal: belongs to another tuning"):
+        tune.search(objective(gains=other), 8, 1, journal)
+    journal.write_text("gains\n")
+    with pytest.raises(TwinError, match="journal: is no journal"):
+        tune.search(objective(), 8, 1, journal)
+
+
+def test_gains_that_diverge_cost_the_worst_and_not_the_tuning(tmp_path):
+    def cost(gains):
+        if gains["a"] > 300.0:
+            raise TwinError("blew up")
+        return math.nan if gains["b"] > 1000.0 else bowl(gains)
+
+    found = tune.search(objective(cost), 20, 1, tmp_path / "journal")
+    assert found.cost < 1.0
+    assert found.evaluated["a"] <= 300.0
+    everywhere = tune.search(objective(lambda gains: math.inf), 4, 1, tmp_path / "journal")
+    assert everywhere.cost == 1e3
+
+
+def test_todays_gains_are_tried_first(tmp_path):
+    seen = []
+    tune.search(objective(lambda g: seen.append(dict(g)) or bowl(g)), 4, 1, tmp_path / "j")
+    assert seen[0] == pytest.approx({"a": 5.0, "b": 5.0})
+
+
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [
+        ({"a": (10.0, 1.0)}, "bounds of a are 10 to 1; allowed: 0 < lower < upper"),
+        ({"a": (0.0, 1.0)}, "bounds of a are 0 to 1"),
+        ({"c": (1.0, 2.0)}, "has no gain 'c'; allowed: a, b"),
+    ],
+)
+def test_bounds_that_make_no_sense_are_named(bounds, message):
+    with pytest.raises(TwinError, match=message):
+        tune.with_bounds(GAINS, bounds)
+
+
+def test_gains_of_laws_are_put_where_they_belong():
     laws = roll_yaw.STUDY.laws["til-paper"]
-    gains = tune.gains_of(laws)
-    changed = tune.with_gains(laws, gains, [7.0, 11.0])
-    assert [law.gain for law in changed] == [7.0, 11.0]
-    assert [law.parameter for law in changed] == ["Jxx", "Jzz"]
+    assert [gain.name for gain in tune_laws.gains_of(laws)] == ["Jxx gain", "Jzz gain"]
+    changed = tune_laws.with_gains(laws, {"Jxx gain": 7.0, "Jzz gain": 11.0})
+    assert [(law.parameter, law.gain) for law in changed] == [("Jxx", 7.0), ("Jzz", 11.0)]
 
 
 def test_cases_that_count_are_those_of_a_right_twin():
-    assert [case.name for case in tune.cases_of(mass.STUDY)] == [
+    assert [case.name for case in tune_laws.cases_of(mass.STUDY)] == [
         "noiseless, correct CM",
         "noisy, correct CM",
     ]
-    assert all("wrong" not in case.name for case in tune.cases_of(roll_yaw.STUDY))
+    assert all("wrong" not in case.name for case in tune_laws.cases_of(roll_yaw.STUDY))
 
 
 def test_no_reported_seed_tunes():
-    assert min(tune.SEEDS) >= 1000
+    assert min(*tune_laws.SEEDS, tune_states.SEED) >= 1000
 
 
-def test_result_is_the_best_point_tried_and_repeatable(tmp_path, monkeypatch):
-    """On a bowl in the plane of the gains' logarithms, instead of drives."""
-
-    def bowl(study, estimator, gains, point, jobs):
-        return float(np.sum((np.array(point) - 2.0) ** 2) + 0.5)
-
-    monkeypatch.setattr(tune, "_cost", bowl)
-    results = []
-    for name in ("a.toml", "b.toml"):
-        result = tune.run(roll_yaw.STUDY, "til-paper", 20, 1, tmp_path / name)
-        results.append([(row.case, row.quantity, row.median) for row in result.rows])
-    assert results[0] == results[1]
-    written = tomllib.loads((tmp_path / "a.toml").read_text())
-    assert written["study"] == "roll-yaw"
-    assert written["geometric_mean_rms_pct"] < 0.6
-    assert written["predicted"]["Jxx"]["gain"] == pytest.approx(100.0, rel=0.5)
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "a.toml", tmp_path / "b.toml"]
+def test_cost_of_laws_is_the_geometric_mean_over_parameters_and_cases(monkeypatch):
+    monkeypatch.setattr(tune_laws, "score", lambda run, laws: [(2.0, 0.0), (8.0, 0.0)])
+    gains = {"Jxx gain": 7.0, "Jzz gain": 11.0}
+    cost = tune_laws.Cost(roll_yaw.STUDY.target, "til-paper")(gains)
+    assert cost == pytest.approx(4.0)
 
 
-def test_gains_that_blow_the_twin_up_cost_the_worst(monkeypatch):
-    def explode(run, laws):
-        raise TwinError("blew up")
+def test_result_of_a_study_is_on_file_with_what_made_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(tune_laws, "score", lambda run, laws: [(laws[0].gain, 0.0)] * 2)
+    path = tmp_path / "a.toml"
+    result = tune_laws.run(roll_yaw.STUDY, tuning(path, estimator="til-paper"))
+    written = tomllib.loads(path.read_text())
+    assert (written["vehicle"], written["estimator"]) == ("suv", "til-paper")
+    assert written["made"]["tuning"] == "roll-yaw"
+    assert written["made"]["seeds"] == list(tune_laws.SEEDS)
+    rows = {(row.case, row.quantity): row.median for row in result.rows}
+    assert rows["best evaluated", "Jxx gain"] == written["gains"]["Jxx gain"]
+    assert rows["best predicted", "Jxx gain"] == written["predicted"]["Jxx gain"]
+    assert list(tmp_path.iterdir()) == [path]
 
-    monkeypatch.setattr(tune, "score", explode)
-    costs = tune._Scored(mass.STUDY.laws["til"])(None)
-    assert costs.tolist() == [tune.WORST]
+
+def tuning(path, **changes):
+    return Tuning(**{"estimator": "til", "evaluations": 4, "jobs": 1, "path": path} | changes)
 
 
-def test_unknown_estimator_is_named(tmp_path):
-    with pytest.raises(TwinError, match="estimator is 'best'; allowed: til, til-paper"):
-        tune.run(mass.STUDY, "best", 4, 1, tmp_path / "x.toml")
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"estimator": "best"}, "estimator is 'best'; allowed: til, til-paper"),
+        ({"cost": "paper"}, "cost is 'paper'; mass allows: robust"),
+    ],
+)
+def test_what_a_study_cannot_tune_is_named(tmp_path, changes, message):
+    with pytest.raises(TwinError, match=message):
+        tune_laws.run(mass.STUDY, tuning(tmp_path / "x.toml", **changes))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"estimator": "zero"}, "estimator is 'zero'; allowed: til, til-paper, double-track"),
+        ({"cost": "cheap"}, "cost is 'cheap'; allowed: robust, paper"),
+        ({"bounds": {"ay_vy": (0.5, 0.1)}}, "bounds of ay_vy are 0.5 to 0.1"),
+    ],
+)
+def test_what_the_states_cannot_be_tuned_by_is_named(tmp_path, changes, message):
+    with pytest.raises(TwinError, match=message):
+        tune_states.run("mismatched", tuning(tmp_path / "x.toml", **changes))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_costs_of_the_states_are_those_of_their_formulas(monkeypatch):
+    from scenarios.state_study import Score
+
+    one = Score(
+        sideslip=0.2, mass=31.1858, mass_at_end=0.0, mass_last_10s=7.0, axle_force=(0.0, 0.0)
+    )
+    monkeypatch.setattr(tune_states, "score", lambda run: one)
+    robust, paper = (tune_states.Cost("same", "til", name)({}) for name in tune_states.COSTS)
+    assert robust == pytest.approx(0.2 / 0.1 + 2.0)  # 31.2 kg are 2 % of 1559.29 kg
+    assert paper == pytest.approx(10.0 * 0.2 + 7.0)

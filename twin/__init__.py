@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from twin.channels import (
     EXTENDED,
+    FORCES,
     FURTHER_OUTPUTS,
     INPUTS,
     LOAD,
@@ -27,6 +28,7 @@ from twin.truck_parameters import TruckParameters
 
 if TYPE_CHECKING:
     from twin.commonroad_twin import CommonRoadTwin
+    from twin.fleet import Fleet
     from twin.fmu_twin import FmuTwin
     from twin.truck_twin import TruckTwin
     from twin.twin import Snapshot, Twin, check_inputs
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 _COMPILED = {
     "CommonRoadTwin": "twin.commonroad_twin",
     "FmuTwin": "twin.fmu_twin",
+    "Fleet": "twin.fleet",
     "Snapshot": "twin.twin",
     "TruckTwin": "twin.truck_twin",
     "Twin": "twin.twin",
@@ -44,6 +47,7 @@ _COMPILED = {
 
 __all__ = [
     "EXTENDED",
+    "FORCES",
     "FURTHER_OUTPUTS",
     "INPUTS",
     "LOAD",
@@ -55,6 +59,7 @@ __all__ = [
     "WHEELS",
     "CommonRoadTwin",
     "Drive",
+    "Fleet",
     "FmuNames",
     "FmuTwin",
     "PointMass",

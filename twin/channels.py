@@ -48,7 +48,9 @@ LOAD = ("mass", "cm_x", "cm_y", "cm_z", "Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz"
 # friction and cornering stiffness of the tyres, air drag, suspension springs with anti-roll bars
 # (at the nominal ride height), dampers
 SCALES = ("tyre_friction", "cornering_stiffness", "drag", "spring", "damper")
-PARAMETERS = (*LOAD, *SCALES)
+# Lateral forces [N] on the axles, at the road, that its tyres do not account for; to the left
+FORCES = ("axle_force_front", "axle_force_rear")
+PARAMETERS = (*LOAD, *SCALES, *FORCES)
 
 # What a wheel's tyre does, in the frame of its contact patch: forces [N] and moments [N m] on the
 # wheel, slip ratio [-], slip angle and camber [rad], relaxed as the tyre feels them.

@@ -11,10 +11,11 @@ from typing import Any
 from numba import njit, types
 
 from twin.car import CAR
+from twin.channels import FORCES
 from twin.parameters import set_load
 from twin.scales import set_scales
 from twin.states import copy_states, correct_states, states_are_sound
-from twin.stepping import step_car
+from twin.stepping import FIRST_FORCE, step_car
 
 _IN = types.Array(types.float64, 1, "C", readonly=True)  # read only: or writable
 _OUT = types.Array(types.float64, 1, "C")
@@ -69,13 +70,16 @@ def set_parameters(car, p):
 
     Args:
         car: the car.
-        p: (15,) deltas from the nominal car, `twin.channels.PARAMETERS`: mass [kg], CM [m], inertia
-            tensor about the new CM [kg m2], and relative ones of tyres, drag, springs and dampers.
+        p: (17,) deltas from the nominal car, `twin.channels.PARAMETERS`: mass [kg], CM [m], inertia
+            tensor about the new CM [kg m2], relative ones of tyres, drag, springs and dampers, and
+            lateral forces on the axles [N].
             On return it holds what was set: the mass has a floor, the tensor is one that a rigid
             body can have, scales stay within `twin.scales`' bounds.
     """
     set_load(car, p.ctypes)
     set_scales(car, p.ctypes)
+    for i in range(FIRST_FORCE, FIRST_FORCE + len(FORCES)):
+        car.parameters[i] = p[i]
 
 
 @_compiled(types.boolean, CAR)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.channels import SCALES
+from twin.channels import FORCES, SCALES
 from twin.errors import TwinError
 
 # The entries of the inertia tensor in the order of `twin.channels.LOAD`
@@ -88,11 +88,12 @@ def steiner(mass: float, offset: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def parameter_deltas(nominal: RigidBody, changed: RigidBody) -> NDArray[np.float64]:
-    """(15,) change of `twin.PARAMETERS` [kg, m, kg m2], each inertia about its body's own CM.
+    """(17,) change of `twin.PARAMETERS` [kg, m, kg m2], each inertia about its body's own CM.
 
-    A load changes no scale: those are zero.
+    A load changes no scale and pushes no axle: those are zero.
     """
-    return np.append(_parameters(changed) - _parameters(nominal), np.zeros(len(SCALES)))
+    rest = np.zeros(len(SCALES) + len(FORCES))
+    return np.append(_parameters(changed) - _parameters(nominal), rest)
 
 
 def _parameters(body: RigidBody) -> NDArray[np.float64]:

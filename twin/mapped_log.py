@@ -33,8 +33,9 @@ def load_drive(path: str | Path, map_path: str | Path) -> Drive:
 
     Inputs are those of `twin.INPUTS`, less the torques where the twin is to follow the speed.
     Measurements are `twin.OUTPUTS`, NaN where the log has none, and behind them what it has of
-    `twin.FURTHER_OUTPUTS`. `settings["log"]` holds the file, the map, whether to follow the speed
-    and, under "done", sentences that say what was done and what cannot be estimated.
+    `twin.FURTHER_OUTPUTS`. `settings["log"]` holds the file, the map, whether to follow the speed,
+    the inputs that the map declares constant and, under "done", sentences that say what was done
+    and what cannot be estimated.
 
     Args:
         path: CSV, Parquet or MDF 4.
@@ -86,6 +87,7 @@ def drive_of(log: RawLog, log_map: LogMap) -> Drive:
                 "file": log.path.name,
                 "map": log_map.path.name,
                 "follow_speed": log_map.follow_speed,
+                "constants": list(log_map.constants),
                 "done": done,
             }
         },

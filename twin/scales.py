@@ -19,14 +19,25 @@ from twin.lanes import pointer
 
 # Beyond these factors it is no longer the same car
 LEAST_SCALE, LARGEST_SCALE = 0.3, 3.0
-# Scaling coefficients of a .tir file behind each name; relaxation lengths are no parameter of a
-# twin, but a real vehicle may have others
+# Coefficients of a .tir file behind each name; those after the first two are no parameters of a
+# running twin, but a real vehicle has others than its files say
 TYRE_SCALES = {
     "tyre_friction": ("lmux", "lmuy"),
     "cornering_stiffness": ("lky",),
     "relaxation": ("lsgkp", "lsgal"),
+    "slip_stiffness": ("lkx",),
+    "combined_slip": ("lyka",),  # how soon lateral force is lost to slip
+    "load_of_largest_stiffness": ("pky2",),  # large: cornering stiffness in proportion to load
+    "lateral_curvature": ("ley",),
 }
-VEHICLE_SCALES = (*SCALES, "relaxation")
+# Each for all tyres, or for those of an axle, as in rear_tyre_friction
+_TYRES = {"": slice(None), "front_": slice(0, 2), "rear_": slice(2, 4)}
+VEHICLE_SCALES = (
+    *SCALES,
+    *(name for name in TYRE_SCALES if name not in SCALES),
+    *(f"{axle}{name}" for name in TYRE_SCALES for axle in _TYRES if axle),
+    *("front_anti_roll", "rear_anti_roll", "steering_ratio"),
+)
 BARS = tuple(f"anti_roll_{axle}" for axle in AXLES)
 
 _FRICTION, _CORNERING, _DRAG, _SPRING, _DAMPER = range(len(LOAD), len(LOAD) + len(SCALES))
@@ -34,11 +45,13 @@ _LMUX, _LMUY, _LKY = (NAMES.index(name) for name in SCALED_TYRE)
 
 
 def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
-    """Scales records of `twin.tir.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
-    for name, keys in TYRE_SCALES.items():
-        for key in keys:
-            column: NDArray[np.float64] = tyres[key]  # pyright: ignore[reportAssignmentType]
-            column *= factors.get(name, 1.0)
+    """Scales four records of `twin.tir.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
+    for axle, wheels in _TYRES.items():
+        for name, keys in TYRE_SCALES.items():
+            factor = np.ones(len(WHEELS))
+            factor[wheels] = factors.get(axle + name, 1.0)
+            for key in keys:
+                tyres[key] = tyres[key] * factor
 
 
 def scale_model(model: mujoco.MjModel, factors: Mapping[str, float]) -> None:
@@ -49,9 +62,12 @@ def scale_model(model: mujoco.MjModel, factors: Mapping[str, float]) -> None:
         model.jnt_stiffness[joint.id] *= spring
         model.qpos_spring[joint.qposadr] /= spring
         model.dof_damping[joint.dofadr] *= factors.get("damper", 1.0)
-    model.tendon_stiffness[[bar for bar in bars(model) if bar >= 0]] *= spring
-    drag = model.numeric("drag_area")
-    model.numeric_data[model.numeric_adr[drag.id]] *= factors.get("drag", 1.0)
+    for axle, bar in zip(AXLES, bars(model), strict=True):
+        if bar >= 0:
+            model.tendon_stiffness[bar] *= spring * factors.get(f"{axle}_anti_roll", 1.0)
+    for name, number in (("drag", "drag_area"), ("steering_ratio", "steering_ratio")):
+        numeric = model.numeric(number)
+        model.numeric_data[model.numeric_adr[numeric.id]] *= factors.get(name, 1.0)
 
 
 def bars(model: mujoco.MjModel) -> list[int]:

@@ -6,7 +6,7 @@ from numba import types
 
 from twin.boundary import VECTOR, behind
 from twin.car import CAR
-from twin.channels import OUTPUTS, TYRE_OUTPUTS
+from twin.channels import FORCES, OUTPUTS, PARAMETERS, TYRE_OUTPUTS
 from twin.contact import LATERAL, LONGITUDINAL, ROAD, combine, cross, difference, dot, wheel_contact
 from twin.elementary import clip
 from twin.four_tyres import four_tyres
@@ -15,6 +15,7 @@ from twin.libmujoco import mj_step1, mj_step2
 
 AIR_DENSITY = 1.2  # [kg/m3]
 STATES = 3  # columns of the tyre state
+FIRST_FORCE = PARAMETERS.index(FORCES[0])
 
 
 @inlined
@@ -60,6 +61,21 @@ def _air(car):
     for i in range(3):
         applied[i] += (front + rear) * up[i] - pressure * car.drag_area * ahead[i]
     applied[4] -= car.axle[0] * front + car.axle[1] * rear  # about the body's y axis
+
+
+@inlined
+def _axle_forces(car, ground):
+    """Lateral forces at each axle, along the body's y axis at the height of the road."""
+    front, rear = car.parameters[FIRST_FORCE], car.parameters[FIRST_FORCE + 1]
+    if front == 0.0 and rear == 0.0:
+        return
+    left = _axis(car, car.chassis, 1)
+    applied = pointer(car.qfrc_applied)
+    for i in range(3):
+        applied[i] += (front + rear) * left[i]
+    height = _vector(pointer(car.xpos), car.chassis)[2] - ground
+    applied[3] += height * (front + rear)
+    applied[5] += car.axle[0] * front + car.axle[1] * rear
 
 
 @inlined
@@ -154,6 +170,7 @@ def step_car(car, u, y):
         applied[i] = 0.0
     _air(car)
     road = load(u, 9)
+    _axle_forces(car, 0.25 * _total(road))
     _wheels(car, load(u, 1), load(u, 5), road, _road_normal(car, unpack(road)))
     mj_step2(car.model, car.data)
     sensordata = pointer(car.sensordata)

@@ -10,6 +10,7 @@ from twin import kernel
 from twin.car import AXLES, DATA_VIEWS, MODEL_VIEWS, SCALED_TYRE, Car, new_car
 from twin.channels import (
     EXTENDED,
+    FORCES,
     INPUTS,
     OUTPUTS,
     PARAMETERS,
@@ -20,6 +21,7 @@ from twin.channels import (
 )
 from twin.contact import ROAD
 from twin.errors import TwinError
+from twin.fingerprint import fingerprint
 from twin.four_tyres import table_of
 from twin.scales import bars
 from twin.tyre import effective_radius
@@ -37,7 +39,7 @@ class Snapshot(NamedTuple):
 
     state: Array  # MuJoCo's integration state
     tyre_state: Array  # (4, 3)
-    parameters: Array  # (15,)
+    parameters: Array  # (17,)
 
 
 class Twin:
@@ -184,7 +186,7 @@ class Twin:
         kernel.correct(self.car, _vector(dx, len(STATES), "correct"))
 
     def set_parameters(self, p: ArrayLike) -> Array:
-        """Sets the (15,) parameters, see `parameters`; returns what is physically valid."""
+        """Sets the (17,) parameters, see `parameters`; returns what is physically valid."""
         p = _vector(p, len(PARAMETERS), "set_parameters").copy()
         kernel.set_parameters(self.car, p)
         return p
@@ -210,6 +212,10 @@ class Twin:
         mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
         self.car.tyre_state[:] = snapshot.tyre_state
         kernel.set_parameters(self.car, snapshot.parameters.copy())
+
+    def fingerprint(self) -> str:
+        """Hash of the vehicle: a snapshot belongs to twins of the same one."""
+        return fingerprint(self.vehicle)
 
     def check(self) -> None:
         """Raises TwinError once the simulation has blown up."""
@@ -306,6 +312,7 @@ def _bind(model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void]) -
                 *np.diag(inertia),
                 *(inertia[0, 1], inertia[0, 2], inertia[1, 2]),
                 *(1.0 for _ in SCALES),
+                *(0.0 for _ in FORCES),
             ]
         ),
         compiled_inertia=np.append(model.body_inertia[chassis], model.body_iquat[chassis]),

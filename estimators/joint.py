@@ -1,0 +1,237 @@
+"""The joint observer: all parameters of a black box at once, with their covariance.
+
+See `estimators.joint_kernel` for the method, and `JointSettings` for what can be chosen.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimators import joint_kernel
+from estimators.estimate import Estimate
+from estimators.joint_kernel import RING, Log, Memory, Setup
+from twin import OUTPUTS, PARAMETERS, SCALES, Drive, Fleet, Snapshot, TwinError, Vehicle, check_inputs
+
+Array = NDArray[np.float64]
+
+# What is estimated of the sensors: biases of the IMU, the delay of all signals, the IMU's position
+# beside where the twin has it. None of them needs a twin.
+FAULTS = (*(f"bias_{name}" for name in OUTPUTS[:6]), "delay", "imu_x", "imu_y", "imu_z")
+# Standard deviations before the first sample: a full car more or less, its CM anywhere between the
+# seats, and a model of tyres and springs from a data sheet
+PRIOR_SD = {
+    "mass": 300.0,
+    **{"cm_x": 0.08, "cm_y": 0.04, "cm_z": 0.06},
+    **{"Jxx": 150.0, "Jyy": 900.0, "Jzz": 900.0},
+    **{"Jxy": 30.0, "Jxz": 80.0, "Jyz": 30.0},
+    **dict.fromkeys(SCALES, 0.15),
+    "drag": 0.3,
+}
+# A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m]
+FAULT_SD = dict(
+    zip(FAULTS, (0.1, 0.1, 0.1, 0.005, 0.005, 0.005, 0.01, 0.07, 0.07, 0.07), strict=True)
+)
+# How far each twin is off: as in `estimators.limits`, large beside rounding, small beside curvature
+OFFSETS = {
+    "mass": 10.0,
+    **dict.fromkeys(("cm_x", "cm_y", "cm_z"), 0.005),
+    **{"Jxx": 10.0, "Jyy": 30.0, "Jzz": 30.0},
+    **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 10.0),
+    **dict.fromkeys(SCALES, 0.01),
+    "drag": 0.05,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSettings:
+    """What a joint observer estimates, and how.
+
+    Attributes:
+        parameters: of `twin.PARAMETERS`, one twin for each.
+        faults: of `FAULTS`, what is estimated of the sensors along.
+        prior_sd: by parameter, instead of `PRIOR_SD`.
+        noise_factor: by which the noise's variance is taken larger than it is, for what the
+            linearisation leaves out.
+        doubt: by which it is first taken larger besides, until innovations prove to be white.
+        doubt_memory: how fast that is seen [s].
+        drift: share of its prior sd that a parameter may wander over a second.
+        step: largest share of its prior sd by which an estimate moves in a block.
+        hold_off: seconds before the first correction.
+        block: samples per correction.
+        speed_gain: draws each twin's speed to the measured wheel speeds [1/s].
+        least_excitation: variance over a second below which nothing is learnt [m2/s4]: that of
+            ax and ay, and 900 m2/s2 times that of roll and pitch rate.
+    """
+
+    parameters: tuple[str, ...] = PARAMETERS
+    faults: tuple[str, ...] = FAULTS
+    prior_sd: Mapping[str, float] = field(default_factory=dict)
+    noise_factor: float = 1.0
+    doubt: float = 3.0
+    doubt_memory: float = 10.0
+    drift: float = 0.001
+    step: float = 0.1
+    hold_off: float = 1.0
+    block: int = 10
+    speed_gain: float = 0.5
+    least_excitation: float = 0.02
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointEstimate(Estimate):
+    """A run of the joint observer.
+
+    Attributes:
+        estimated: p names of what was estimated, in the order of `covariance`; faults follow.
+        sd: (N, p + b) standard deviation of each estimate.
+        faults: (N, b) of the sensors, in the order of `JointSettings.faults`.
+        covariance: (p + b, p + b) at the end.
+        information: (p + b, p + b) Fisher's, of all that was used.
+    """
+
+    estimated: tuple[str, ...]
+    sd: Array
+    faults: Array
+    covariance: Array
+    information: Array
+
+
+class JointObserver:
+    """Estimates parameters of a black box jointly, by twins that differ in one each.
+
+    Args:
+        vehicle: of the twins.
+        noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
+        settings: what is estimated, and how.
+
+    Raises:
+        TwinError: a name is unknown or given twice, or a number is out of range.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, noise_sd: ArrayLike, settings: JointSettings = JointSettings()  # noqa: B008
+    ) -> None:
+        self.settings = settings
+        names = settings.parameters
+        _check(settings, np.asarray(noise_sd, dtype=np.float64))
+        self.fleet = Fleet(vehicle, len(names) + 1)
+        self.estimated = (*names, *settings.faults)
+        prior = PRIOR_SD | dict(settings.prior_sd)
+        self._prior = np.array(
+            [prior[name] for name in names] + [FAULT_SD[name] for name in settings.faults]
+        )
+        first = self.fleet.twins[0]
+        self.dt = first.dt
+        self._setup = Setup(
+            index=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
+            offset=np.array([OFFSETS[name] for name in names]),
+            fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
+            step_limit=settings.step * self._prior,
+            drift=(settings.drift * self._prior) ** 2,
+            noise=settings.noise_factor * np.asarray(noise_sd, dtype=np.float64) ** 2,
+            nominal=first.car.nominal.copy(),
+            block=settings.block,
+            hold_off=round(settings.hold_off / (settings.block * self.dt)),
+            speed_gain=settings.speed_gain,
+            least_excitation=settings.least_excitation,
+            rate_weight=900.0,
+            memory=1.0,
+            doubt=settings.doubt,
+            doubt_memory=settings.doubt_memory,
+            dt=self.dt,
+        )
+        n, p, q = len(self.fleet), len(PARAMETERS), self._prior.size
+        ny, nx = len(OUTPUTS), len(first.states)
+        self._memory = Memory(
+            theta=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
+            out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
+            count=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
+            excitation=np.zeros((2, 4)), innovation=np.zeros(ny), expected=np.zeros(ny),
+            information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
+            ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
+            doubt=np.zeros(ny), window=np.zeros((3, ny)), window_h=np.zeros((ny, q)),
+        )  # fmt: skip
+        self.reset(0.0)
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike = (0.0, 0.0, 0.0, 0.0),
+    ) -> None:
+        """Starts anew: the twins settle at a speed, each with its own parameters.
+
+        Args:
+            speed: [m/s].
+            parameters: deltas from the nominal vehicle by name; zero where not given.
+            road: (4,) height under each wheel [m].
+        """
+        memory = self._memory
+        for array in memory:
+            array[:] = 0
+        for name, value in (parameters or {}).items():
+            if name not in PARAMETERS:
+                raise TwinError(
+                    f"joint: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
+                )
+            memory.theta[PARAMETERS.index(name)] = value
+        memory.z[: self._setup.index.size] = memory.theta[self._setup.index]
+        memory.covariance[:] = np.diag(self._prior**2)
+        memory.doubt[:] = self.settings.doubt
+        for i, twin in enumerate(self.fleet.twins):
+            p = memory.theta.copy()
+            if i > 0:
+                p[self._setup.index[i - 1]] += self._setup.offset[i - 1]
+            twin.set_parameters(p)
+            twin.reset(speed, road)
+
+    def run(self, drive: Drive) -> JointEstimate:
+        """Observes a whole drive, from the state that the observer is in.
+
+        Raises:
+            TwinError: the drive does not fit the twins, or a twin has blown up.
+        """
+        check_inputs(drive.inputs, "drive")
+        n, twin, q = len(drive), self.fleet.twins[0], self._prior.size
+        log = Log(
+            states=np.empty((n, len(twin.states))),
+            parameters=np.empty((n, len(PARAMETERS))),
+            outputs=np.empty((n, len(OUTPUTS))),
+            extended=np.empty((n, *twin.car.tyre_output.shape)),
+            sd=np.empty((n, q)),
+            faults=np.empty((n, q - self._setup.index.size)),
+        )
+        done = joint_kernel.run(
+            self.fleet.cars, self._setup, self._memory, drive.inputs, drive.measurements, log
+        )
+        if done < n:
+            raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
+        return JointEstimate(
+            time=drive.time,
+            states=log.states,
+            parameters=log.parameters,
+            outputs=log.outputs,
+            extended=log.extended.reshape(n, -1),
+            nominal=self._setup.nominal.copy(),
+            estimated=self.estimated,
+            sd=log.sd,
+            faults=log.faults,
+            covariance=self._memory.covariance.copy(),
+            information=self._memory.information.copy(),
+        )
+
+
+def _check(settings: JointSettings, noise_sd: Array) -> None:
+    unknown = [name for name in settings.parameters if name not in PARAMETERS]
+    if unknown or len(set(settings.parameters)) < len(settings.parameters):
+        raise TwinError(
+            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once of "
+            f"{', '.join(PARAMETERS)}"
+        )
+    if noise_sd.shape != (len(OUTPUTS),) or not (np.isnan(noise_sd) | (noise_sd > 0.0)).all():
+        raise TwinError(
+            f"joint: noise_sd is {noise_sd.tolist()}; allowed: {len(OUTPUTS)} numbers above zero, "
+            "NaN for a channel that is not used"
+        )

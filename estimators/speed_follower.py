@@ -1,0 +1,74 @@
+"""Torques for a twin whose vehicle's are unknown: it follows the measured speed.
+
+The force at the road is the measured longitudinal acceleration times the mass, drag, and what
+the twin's speed lacks; a positive one drives, a negative one brakes. With a force made to fit, the
+mass is not observable: scaling it scales the force.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from twin import INPUTS, STATES, TwinError
+
+TORQUES = tuple(name for name in INPUTS if "torque" in name)
+HALF_AIR_DENSITY = 0.6  # [kg/m3]
+
+_VX = STATES.index("vx")
+_REAR_LEFT, _REAR_RIGHT = STATES.index("wheel_speed_rl"), STATES.index("wheel_speed_rr")
+
+
+class SpeedFollower(NamedTuple):
+    """How a speed is followed, and how a vehicle turns force into torques at its wheels."""
+
+    mass: float  # [kg], of the whole vehicle; an error of it is left to the gain
+    drag_area: float = 0.0  # [m2]
+    gain: float = 10.0  # [1/s]; chosen: a lag of 0.1 s, and slower than a tyre's slip
+    radius_front: float = 0.3  # [m], of the wheels
+    radius_rear: float = 0.3
+    drive_front: float = 0.0  # share of the front axle in driving
+    brake_front: float = 0.65  # ... and in braking
+    locking: float = 0.0  # [N m s/rad], from the faster rear wheel to the slower one, driving
+
+
+def check_follower(follower: SpeedFollower) -> None:
+    """Refuses what makes no sense.
+
+    Raises:
+        TwinError: a number is not finite or out of range.
+    """
+    limits = {"mass": 1.0, "radius_front": 0.05, "radius_rear": 0.05}
+    shares = ("drive_front", "brake_front")
+    for name, value in follower._asdict().items():
+        least, largest = limits.get(name, 0.0), 1.0 if name in shares else np.inf
+        if not least <= value <= largest or np.isinf(value):
+            raise TwinError(
+                f"speed follower: {name} is {value}; allowed: {least:g} to {largest:g}, finite"
+            )
+
+
+@njit(cache=True, nogil=True)
+def follow(follower, speed, acceleration, states, u):
+    """Fills in the torques of one sample of inputs.
+
+    Args:
+        follower: a `SpeedFollower`.
+        speed: measured [m/s].
+        acceleration: measured, longitudinal [m/s2]; NaN: it is left to the gain.
+        states: (28,) of the twin, `twin.STATES`.
+        u: (13,) inputs, `twin.INPUTS`; torques are overwritten.
+    """
+    ahead = 0.0 if np.isnan(acceleration) else acceleration
+    force = follower.mass * (ahead + follower.gain * (speed - states[_VX]))
+    force += HALF_AIR_DENSITY * follower.drag_area * states[_VX] * abs(states[_VX])
+    front, rear = 0.5 * follower.radius_front * force, 0.5 * follower.radius_rear * force
+    u[1:9] = 0.0
+    if force > 0.0:
+        moved = follower.locking * (states[_REAR_LEFT] - states[_REAR_RIGHT])
+        u[1] = u[2] = front * follower.drive_front
+        u[3] = rear * (1.0 - follower.drive_front) - moved
+        u[4] = rear * (1.0 - follower.drive_front) + moved
+    else:
+        u[5] = u[6] = -front * follower.brake_front
+        u[7] = u[8] = -rear * (1.0 - follower.brake_front)

@@ -1,0 +1,106 @@
+"""What `til calibrate` can free: a name, what it changes, its unit and its bounds.
+
+Most are factors on what a car's files say (`Vehicle.scaled`), some are parameters of a running twin
+(deltas from the nominal chassis). The rest belongs to the log and to the observer: offsets of
+its sensors, how the unknown torques are made, gains.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from twin import TwinError
+from twin.scales import LARGEST_SCALE, LEAST_SCALE, VEHICLE_SCALES
+
+Kind = Literal["scale", "load", "offset", "follower", "gain"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Free:
+    """A number that a fit may change.
+
+    Attributes:
+        kind: of what: a factor on the vehicle's files; a delta of the twin's chassis; an offset
+            that is added to a channel; a field of `SpeedFollower`; a gain.
+        unit: of the number.
+        start: where it is not given.
+        low, high: bounds.
+        scale: a change that makes a difference.
+        of: the gain's (state, output).
+    """
+
+    kind: Kind
+    unit: str
+    start: float
+    low: float
+    high: float
+    scale: float
+    of: tuple[str, str] = ("", "")
+
+
+def _scale() -> Free:
+    return Free(
+        kind="scale", unit="1", start=1.0, low=LEAST_SCALE, high=LARGEST_SCALE, scale=0.3
+    )  # fmt: skip
+
+
+def _delta(unit: str, least: float, largest: float) -> Free:
+    return Free(
+        kind="load", unit=unit, start=0.0, low=least, high=largest, scale=0.2 * (largest - least)
+    )
+
+
+def _offset(unit: str, largest: float) -> Free:
+    return Free(
+        kind="offset", unit=unit, start=0.0, low=-largest, high=largest, scale=0.1 * largest
+    )
+
+
+def _gain(unit: str, start: float, low: float, high: float, of: tuple[str, str]) -> Free:
+    return Free(
+        kind="gain", unit=unit, start=start, low=low, high=high, scale=0.05 * (high - low), of=of
+    )
+
+
+# Bounds are chosen: wide for a passenger car whose files are roughly right.
+FREE: Mapping[str, Free] = {
+    **{name: _scale() for name in VEHICLE_SCALES},
+    "mass": _delta("kg", -500.0, 1000.0),
+    "cm_x": _delta("m", -0.3, 0.3),
+    "cm_y": _delta("m", -0.1, 0.1),
+    "cm_z": _delta("m", -0.2, 0.2),
+    "Jzz": _delta("kg m2", -600.0, 1500.0),
+    "steering_offset": _offset("rad", 0.03),  # of the hand wheel: that of the road wheels x ratio
+    "ay_offset": _offset("m/s2", 1.0),
+    "sideslip_offset": _offset("rad", 0.03),
+    # the measured sideslip's point lies so far before the twin's IMU
+    "sideslip_lever": _offset("m", 0.6),
+    "brake_front": Free(kind="follower", unit="1", start=0.65, low=0.3, high=0.9, scale=0.1),
+    "locking": Free(
+        kind="follower", unit="N m s/rad", start=0.0, low=0.0, high=3000.0, scale=300.0
+    ),
+    "yaw_rate_to_yaw_rate": _gain("1/s", 20.0, 0.0, 100.0, ("yaw_rate", "yaw_rate")),
+    "yaw_rate_to_vy": _gain("m/s per rad", 0.0, -50.0, 50.0, ("vy", "yaw_rate")),
+    "ay_to_vy": _gain("1", 0.0, 0.0, 0.95, ("vy", "ay")),
+}
+
+
+def starts(names: tuple[str, ...], given: Mapping[str, float]) -> dict[str, float]:
+    """Where each name starts: as given, or as the table says.
+
+    Raises:
+        TwinError: a name is unknown or given twice, or a given value is out of bounds.
+    """
+    for name in (*names, *given):
+        if name not in FREE:
+            raise TwinError(f"calibrate: {name!r} is no parameter; allowed: {', '.join(FREE)}")
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise TwinError(f"calibrate: {twice} is freed twice; allowed: once")
+    for name, value in given.items():
+        if not FREE[name].low <= value <= FREE[name].high:
+            raise TwinError(
+                f"calibrate: {name} is {value:g}; allowed: {FREE[name].low:g} to "
+                f"{FREE[name].high:g} {FREE[name].unit}"
+            )
+    return {name: given.get(name, FREE[name].start) for name in names}

@@ -1,0 +1,55 @@
+import pytest
+
+from scenarios import gains, state_study
+from scenarios.state_study import BOUNDS
+from scenarios.tune import Tuned
+from twin import TwinError
+
+TUNED = Tuned(
+    evaluated={"a": 1.5, "b": 2.5}, predicted={"a": 1.0, "b": 2.0}, cost=0.7, evaluations=8
+)
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "gains.toml"
+    gains.write(path, vehicle="suv", estimator="til", tuned=TUNED, made={"seed": 1000})
+    return path
+
+
+def test_best_evaluated_gains_come_back(file):
+    assert gains.read(file, vehicle="suv", estimator="til", names=["b", "a"]) == {
+        "b": 2.5,
+        "a": 1.5,
+    }
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"vehicle": "sports_car"}, "vehicle is 'suv'; allowed here: 'sports_car'"),
+        ({"estimator": "zero"}, "estimator is 'til'; allowed here: 'zero'"),
+        ({"names": ["c"]}, r"gains\.c is None; allowed: a finite number"),
+    ],
+)
+def test_gains_for_something_else_are_refused(file, changes, message):
+    wanted = {"vehicle": "suv", "estimator": "til", "names": ["a"]} | changes
+    with pytest.raises(TwinError, match=f"gains.toml: {message}"):
+        gains.read(file, **wanted)
+
+
+@pytest.mark.parametrize(("text", "message"), [(None, "cannot be read"), ("= 3", "is no TOML")])
+def test_file_that_is_none_is_named(tmp_path, text, message):
+    path = tmp_path / "x.toml"
+    if text:
+        path.write_text(text)
+    with pytest.raises(TwinError, match=f"x.toml: {message}"):
+        gains.read(path, vehicle="suv", estimator="til", names=["a"])
+
+
+@pytest.mark.parametrize("estimator", list(BOUNDS))
+@pytest.mark.parametrize("car", ["sports_car", "bmw_320i"])
+def test_shipped_gains_lie_within_their_bounds(car, estimator):
+    for name, value in state_study.gains_of(car, estimator).items():
+        low, high = BOUNDS[estimator][name]
+        assert low * 0.999 <= value <= high * 1.001
