@@ -31,7 +31,10 @@ DT = 1e-3  # [s]
 HARDEST, BRAKING = 12.0, 6.0  # brakes on a ramp to so many m/s2 within so many s
 NEARLY = 0.98  # of the largest lateral acceleration, up to where a slow turn counts as steady
 LEAST_LOAD = 300.0  # [N]
-LARGEST_SLIP, PURE_SLIP = 0.15, 0.02  # of the direction fitted, beyond it a wheel locks; of the other
+LARGEST_SLIP, PURE_SLIP = (
+    0.15,
+    0.02,
+)  # of the direction fitted, beyond it a wheel locks; of the other
 # b, c, d, e; bounds of c and e keep the curve a tyre's beyond the slips that steady states reach
 START, LOW, HIGH = (12.0, 1.4, 1.4, 0.0), (2.0, 1.1, 0.3, -2.0), (60.0, 1.7, 3.0, 0.9)
 

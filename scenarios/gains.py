@@ -72,9 +72,7 @@ def read(path: Path, *, vehicle: str, estimator: str, names: Iterable[str]) -> d
         raise TwinError(f"{path}: is no TOML: {' '.join(str(error).split())}") from None
     for field, wanted in (("vehicle", vehicle), ("estimator", estimator)):
         if content.get(field) != wanted:
-            raise TwinError(
-                f"{path}: {field} is {content.get(field)!r}; allowed here: {wanted!r}"
-            )
+            raise TwinError(f"{path}: {field} is {content.get(field)!r}; allowed here: {wanted!r}")
     gains = content.get("gains")
     found = {}
     for name in names:

@@ -76,7 +76,9 @@ class Cost:
         """
         study = find(self.study)
         laws = with_gains(study.laws[self.estimator], values)
-        todo = [run for run in runs(study, cases_of(study), SEEDS) if run.estimator == self.estimator]
+        todo = [
+            run for run in runs(study, cases_of(study), SEEDS) if run.estimator == self.estimator
+        ]
         by_case: dict[str, list[list[float]]] = {}
         for one in todo:
             errors = [min(error, WORST) for error, _ in score(one, laws)]

@@ -5,7 +5,9 @@ from scenarios.state_study import BOUNDS
 from scenarios.tune import Tuned
 from twin import TwinError
 
-TUNED = Tuned(evaluated={"a": 1.5, "b": 2.5}, predicted={"a": 1.0, "b": 2.0}, cost=0.7, evaluations=8)
+TUNED = Tuned(
+    evaluated={"a": 1.5, "b": 2.5}, predicted={"a": 1.0, "b": 2.0}, cost=0.7, evaluations=8
+)
 
 
 @pytest.fixture

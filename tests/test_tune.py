@@ -190,5 +190,3 @@ def test_costs_of_the_states_are_those_of_their_formulas(monkeypatch):
     robust, paper = (tune_states.Cost("same", "til", name)({}) for name in tune_states.COSTS)
     assert robust == pytest.approx(0.2 / 0.1 + 2.0)  # 31.2 kg are 2 % of 1559.29 kg
     assert paper == pytest.approx(10.0 * 0.2 + 7.0)
-
-
