@@ -282,8 +282,8 @@ def _compile_gains(gains: Mapping[tuple[str, str], float], twin: BlackBox) -> Ga
             raise TwinError(f"gain {of} -> {to} is {gain}; allowed: finite numbers")
         if (to, of) in FEED_THROUGH and not gain < 1.0:
             raise TwinError(
-                f"gain {of} -> {to} is {gain}; allowed: less than 1, or the tyres' restoring forces "
-                "change their sign"
+                f"gain {of} -> {to} is {gain}; allowed: less than 1, beyond which the tyres' "
+                "restoring forces change their sign"
             )
     return Gains(
         np.array(state, dtype=np.int64),

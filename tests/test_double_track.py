@@ -141,5 +141,5 @@ def test_drive_of_something_else_is_refused(drive):
 
 def test_file_that_is_no_double_track_is_named(tmp_path):
     (tmp_path / "car.toml").write_text("mass = 3.0\n")
-    with pytest.raises(TwinError, match="car.toml: describes no double track"):
+    with pytest.raises(TwinError, match=r"car\.toml: describes no double track"):
         double_track.load(tmp_path / "car.toml")
