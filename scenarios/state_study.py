@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from estimators import double_track, state_and_mass, static_map
 from estimators.estimate import Estimate
 from estimators.observer import Observer
-from scenarios import commonroad, double_track_fit, gains
+from scenarios import double_track_fit, gains
 from scenarios.drivers import DRIVERS, LIMITS
 from scenarios.manoeuvres import lane_changes, laps
 from scenarios.mismatch import MISMATCHES, real_drive, real_vehicle
@@ -103,6 +103,8 @@ def twin_of(case: str) -> str:
 def clean_drive(case: str, drive: str, duration: float | None) -> Drive:
     """The real vehicle's drive, without noise."""
     if case == COMMONROAD:
+        from scenarios import commonroad  # not at the top: an extra, and it compiles for long
+
         return commonroad.record(manoeuvre(case, drive, duration))
     car = twin_of(case)
     vehicle = real_vehicle(Vehicle.load(car), MISMATCHES[case])
@@ -113,6 +115,8 @@ def manoeuvre(case: str, drive: str, duration: float | None) -> CourseManoeuvre:
     """What the real vehicle is to do."""
     if case != COMMONROAD:
         return DRIVES[drive](duration=duration, limits=LIMITS[TWIN])
+    from scenarios import commonroad  # see `clean_drive`
+
     limits = commonroad.COMMONROAD_LIMITS
     if drive == "laps":
         return laps(duration=duration, limits=limits)
