@@ -41,7 +41,7 @@ TABLE_8 = {
     "double-track": {"ax_vx": 9.282e-2, "ay_vy": 5.271e-2, "yaw_rate": 0.314, "mass": 2.06},
 }
 # Errors of one force at a time: what they do to the mass does not average out
-SINGLE = ("drive-5", "drive+5", "brake-5", "brake+5", "tyre_friction-10", "drag+10", "delay")
+SINGLE = ("drive-5", "drive+5", "brake-5", "brake+5", "cornering_stiffness+10", "drag+10", "delay")
 STARTS = (MISSING, 0.0, -MISSING)  # [kg]
 EVERY = 20  # samples to a point of a line
 DRAWN = {"til": "C0", "til-paper": "C2", "double-track": "C1", "static-map": "0.6"}
