@@ -201,7 +201,7 @@ def test_parameters_set_at_run_time_equal_a_model_made_with_them():
 
 
 ABSURD = [
-    np.array([-1e5, 0, 0, 0, *[0.0] * 11]),
+    np.array([-1e5, 0, 0, 0, *[0.0] * 13]),
     np.array([0.0, 0, 0, 0, -1e6, 0, 0, 0, 0, 0, *[0.0] * 7]),
     np.array([0.0, 0, 0, 0, 0, 0, 1e6, 0, 0, 0, *[0.0] * 7]),
     np.array([0.0, 0, 0, 0, 0, 0, 0, 5e4, -3e4, 2e4, *[0.0] * 7]),

@@ -10,8 +10,10 @@ from cars import SPIN, VX, inputs, run, suv, times
 from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, TYRE_OUTPUTS, Twin, TwinError, Vehicle
 
 DELTAS = np.array(
-    [300.0, -0.2, 0.03, 0.05, 50.0, 400.0, 390.0, 5.0, -20.0, 4.0]
-    + [-0.1, 0.2, 0.3, 0.1, -0.2, 300.0, -200.0]
+    [
+        *(300.0, -0.2, 0.03, 0.05, 50.0, 400.0, 390.0, 5.0, -20.0, 4.0),
+        *(-0.1, 0.2, 0.3, 0.1, -0.2, 300.0, -200.0),
+    ]
 )
 
 
