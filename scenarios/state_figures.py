@@ -42,8 +42,8 @@ TABLE_8 = {
 }
 # Errors of one force at a time: what they do to the mass does not average out
 SINGLE = ("drive-5", "drive+5", "brake-5", "brake+5", "cornering_stiffness+10", "drag+10", "delay")
-# [kg/s per m/s2] of the double track on the ramp; chosen. Tuning leaves as good as none, for lack of
-# anything to find.
+# [kg/s per m/s2] of the double track on the ramp; chosen. Tuning leaves as good as none, for lack
+# of anything to find.
 RAMP_GAIN = 20.0
 STARTS = (MISSING, 0.0, -MISSING)  # [kg]
 EVERY = 20  # samples to a point of a line
@@ -212,8 +212,8 @@ def _estimates(
     name: str, drive: str, last: float | None, seeds: int, jobs: int, out: Path
 ) -> Result:
     start = time.perf_counter()
-    with pictures.figure(out / f"{name}.png", rows=2, title=f"Mass and sideslip: {drive}") as axes:
-        above, below = axes
+    with pictures.figure(out / f"{name}.png", rows=3, title=f"Mass and sideslip: {drive}") as axes:
+        above, middle, below = axes
         truth = None
         for estimator, colour in DRAWN.items():
             seen, belief = observe(Run(case=CASE, drive=drive, estimator=estimator))
@@ -221,12 +221,14 @@ def _estimates(
             truth = seen.time[part], np.degrees(seen.truth["sideslip"][part])
             above.plot(truth[0], belief.mass[part], color=colour, label=estimator)
             sideslip = np.degrees(belief.sideslip[part])
-            below.plot(truth[0], sideslip, color=colour, lw=1, label=estimator)
+            middle.plot(truth[0], sideslip, color=colour, lw=1, label=estimator)
+            below.plot(truth[0], sideslip - truth[1], color=colour, lw=1, label=estimator)
         if truth:
-            below.plot(*truth, color="k", lw=1, ls="--", label="truth")
+            middle.plot(*truth, color="k", lw=1, ls="--", label="truth")
         above.axhline(0.0, color="k", lw=1, ls="--", label="truth")
         above.set(ylabel="error of the mass [kg]")
-        below.set(ylabel="sideslip [deg]", xlabel="time [s]")
+        middle.set(ylabel="sideslip [deg]")
+        below.set(ylabel="error of the sideslip [deg]", xlabel="time [s]")
         for axis in axes:
             axis.legend(fontsize="small", ncols=3)
     todo = state_study.runs([CASE], [drive], ESTIMATORS, range(seeds))
