@@ -27,8 +27,10 @@ TRAVEL, ANGLE = STATES.index("suspension_travel_fl"), STATES.index("wheel_angle_
 AX, AY, ROLL_RATE, PITCH_RATE = (OUTPUTS.index(n) for n in ("ax", "ay", "roll_rate", "pitch_rate"))
 EXCITING = np.array([AX, AY, ROLL_RATE, PITCH_RATE])
 ABSENT = 1e12  # variance of a channel that has no measurement
-# Slower than this a wheel speed tells no speed of the car [rad/s]; chosen
-LEAST_SPIN = 1.0
+# Wheels slower than this [rad/s], 1 m/s, tell nothing: the instant of a stop is a jump
+LEAST_SPIN = 3.0
+STANDING = 0.5  # and slower than this the car stands; chosen
+WATCH, DRIVEN = 0, 1  # blocks: left to look for a change of the load; of exciting driving so far
 SAMPLES, BLOCKS, TOTAL = 0, 1, 2  # what the clock counts: of the block, blocks, of all
 # What is estimated of the sensors besides parameters: biases, delay, and the place of the IMU
 DELAY, POSITION = IMU, IMU + 1
@@ -55,6 +57,13 @@ class Setup(NamedTuple):
     memory: float  # of excitation [s]
     doubt: float  # first factor of the noise's variance, before innovations prove it white
     doubt_memory: float  # [s]
+    prior: Array  # (q,) standard deviations
+    load: Indices  # (l,) estimates that a change of the load changes
+    watch: int  # blocks of driving after a standstill in which such a change is looked for
+    settle: int  # blocks of driving before the first
+    change_memory: float  # of what contradicts [s]
+    surprise: float  # least statistic of a change, chi-square of l degrees of freedom if there is none
+    least_change: float  # and least change of any of them, of its prior sd
     dt: float  # of a sample [s]
 
 
@@ -72,8 +81,6 @@ class Memory(NamedTuple):
     dx: Array  # (nx,)
     p: Array  # (np,) what is set
     excitation: Array  # (2, 4) means and squares of what excites
-    innovation: Array  # (ny,) of the last block
-    expected: Array  # (ny,) its variance
     information: Array  # (q, q) of what was used
     ring: Array  # (RING, n, ny) the twins' last outputs
     late: Array  # (n, ny) the twins' outputs of the delay ago
@@ -81,6 +88,13 @@ class Memory(NamedTuple):
     doubt: Array  # (ny,) factor of each channel's variance that its innovations show
     window: Array  # (3, ny) sums of innovations, of their variance; number of blocks
     window_h: Array  # (ny, q) sums of sensitivities
+    recent: Array  # (q, q) information of the last seconds
+    score: Array  # (q,) and what it says of the parameters' error
+    kept: Array  # (q,) estimates at the last standstill
+    kept_covariance: Array  # (q, q)
+    kept_doubt: Array  # (ny,)
+    blocks: Indices  # (2,)
+    changes: Indices  # (1,) of the load, so far
     clock: Indices  # (3,)
 
 
@@ -195,7 +209,8 @@ def _is_excited(setup, memory):
         square[k] += share * (value**2 - square[k])
         weight = 1.0 if EXCITING[k] < ROLL_RATE else setup.rate_weight
         total += weight * (square[k] - mean[k] ** 2)
-    return total >= setup.least_excitation
+    spin = min(memory.total[0, WHEEL_SPEED:].min() / setup.block, memory.late[:, -1].min())
+    return total >= setup.least_excitation and spin >= LEAST_SPIN
 
 
 @njit(cache=True, nogil=True)
@@ -233,13 +248,20 @@ def _estimate(cars, setup, memory):
     _weigh(setup, memory, h, r, variance)
     q, covariance = memory.z.size, memory.covariance
     seconds = setup.block * setup.dt
-    hp = h @ covariance
-    s = hp @ h.T
-    for j in range(NY):
-        s[j, j] += variance[j]
-        memory.innovation[j], memory.expected[j] = r[j], s[j, j]
     excited = _is_excited(setup, memory)
     if excited and memory.clock[BLOCKS] > setup.hold_off:
+        memory.blocks[DRIVEN] += 1
+        if memory.blocks[WATCH] > 0:
+            memory.blocks[WATCH] -= 1
+            if _load_changed(setup, memory, h, r):
+                before = memory.z.copy()
+                _forget_load(setup, memory)
+                _move(cars, setup, memory, memory.z - before)
+                return
+        hp = h @ covariance
+        s = hp @ h.T
+        for j in range(NY):
+            s[j, j] += variance[j]
         gain = np.ascontiguousarray(np.linalg.solve(s, hp).T)
         move = gain @ r
         share = 1.0
@@ -262,8 +284,77 @@ def _estimate(cars, setup, memory):
                 memory.z[i] = min(max(memory.z[i], -setup.dt), (RING - 2) * setup.dt)
         project(memory.z, covariance, setup.index, setup.nominal, memory.theta)
         _move(cars, setup, memory, memory.z - before)
+    else:
+        _keep(setup, memory)
     for i in range(q):
         covariance[i, i] += setup.drift[i] * seconds
+
+
+@njit(cache=True, nogil=True)
+def _keep(setup, memory):
+    """Keeps the estimates while the car stands: its load may change now."""
+    for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
+        if abs(memory.late[0, j]) > STANDING or abs(memory.measured[j]) > STANDING * setup.block:
+            return
+    if memory.blocks[DRIVEN] < setup.settle:
+        return
+    memory.kept[:], memory.kept_covariance[:] = memory.z, memory.covariance
+    memory.kept_doubt[:] = memory.doubt
+    memory.recent[:], memory.score[:] = 0.0, 0.0
+    memory.blocks[WATCH] = setup.watch
+
+
+@njit(cache=True, nogil=True)
+def _load_changed(setup, memory, h, r):
+    """Whether what was known of the load before the stop contradicts what has been seen since.
+
+    Of the last seconds' information A and score b = sum H' R^-1 r, no change means b ~ N(0, A +
+    A P A). A contradiction that would also move a parameter noticeably is a change of the load.
+    """
+    load = setup.load
+    keep = 1.0 - setup.block * setup.dt / setup.change_memory
+    informed, weighed = np.zeros_like(h), np.zeros_like(r)
+    for j in range(NY):
+        if memory.count[j] > 0.0 and not np.isnan(setup.noise[j]):
+            variance = setup.noise[j] / memory.count[j] * max(memory.kept_doubt[j], 1.0)
+            informed[j], weighed[j] = h[j] / variance, r[j] / variance
+    memory.recent[:] = keep * memory.recent + h.T @ informed
+    memory.score[:] = keep * memory.score + h.T @ weighed
+    if load.size == 0:
+        return False
+    spread = memory.recent + memory.recent @ memory.kept_covariance @ memory.recent
+    a, b = np.empty((load.size, load.size)), np.empty(load.size)
+    told = np.empty((load.size, load.size))
+    for i in range(load.size):
+        scale = setup.prior[load[i]]
+        b[i] = memory.score[load[i]] * scale
+        for k in range(load.size):
+            both = scale * setup.prior[load[k]]
+            # a little more than the parts, so that what is not told can be divided by
+            a[i, k] = spread[load[i], load[k]] * both + (1e-3 if i == k else 0.0)
+            told[i, k] = memory.recent[load[i], load[k]] * both + (1.0 if i == k else 0.0)
+    return (
+        b @ np.linalg.solve(a, b) >= setup.surprise
+        and np.abs(np.linalg.solve(told, b)).max() >= setup.least_change
+    )
+
+
+@njit(cache=True, nogil=True)
+def _forget_load(setup, memory):
+    """Goes back to what was known at the standstill, of the load as uncertain as at first."""
+    load, covariance = setup.load, memory.covariance
+    estimates = memory.z.copy()
+    memory.z[:], covariance[:] = memory.kept, memory.kept_covariance
+    memory.doubt[:] = memory.kept_doubt
+    for k in load:
+        memory.z[k] = estimates[k]
+        covariance[:, k] = 0.0
+        covariance[k] = 0.0
+    for k in load:
+        covariance[k, k] = setup.prior[k] ** 2
+    memory.window[:], memory.window_h[:] = 0.0, 0.0
+    memory.blocks[WATCH] = 0
+    memory.changes[0] += 1
 
 
 @njit(cache=True, nogil=True)
@@ -330,6 +421,7 @@ def run(cars, setup, memory, inputs, measurements, log):
         for i in range(memory.z.size):
             log.sd[k, i] = np.sqrt(memory.covariance[i, i])
         log.faults[k] = memory.z[p:]
+        log.changes[k] = memory.changes[0]
         for i in range(cars.size):
             if not is_sound(cars[i]):
                 return k
@@ -345,3 +437,4 @@ class Log(NamedTuple):
     extended: Array  # (N, 4, 9)
     sd: Array  # (N, q)
     faults: Array  # (N, q - p)
+    changes: Indices  # (N,)
