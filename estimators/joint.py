@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimators import joint_kernel
 from estimators.estimate import Estimate
-from estimators.observer import check_drive, check_measurements
 from estimators.joint_kernel import RING, Log, Memory, Setup
+from estimators.observer import check_drive, check_measurements
 from twin import (
     LOAD,
     OUTPUTS,
@@ -97,7 +97,7 @@ class JointSettings:
     surprise: float = 200.0
     least_change: float = 0.15
     valid_share: float = 0.2
-    drift: float = 0.001
+    drift: float = 0.0003
     step: float = 0.1
     hold_off: float = 1.0
     block: int = 10
@@ -151,7 +151,10 @@ class JointObserver:
     """
 
     def __init__(
-        self, vehicle: Vehicle, noise_sd: ArrayLike, settings: JointSettings = JointSettings()  # noqa: B008
+        self,
+        vehicle: Vehicle,
+        noise_sd: ArrayLike,
+        settings: JointSettings = JointSettings(),
     ) -> None:
         self.settings = settings
         names = settings.parameters
@@ -329,8 +332,13 @@ def _check(settings: JointSettings, noise_sd: Array) -> None:
     unknown = [name for name in settings.parameters if name not in PARAMETERS]
     if unknown or len(set(settings.parameters)) < len(settings.parameters):
         raise TwinError(
-            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once of "
-            f"{', '.join(PARAMETERS)}"
+            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once "
+            f"of {', '.join(PARAMETERS)}"
+        )
+    if not set(settings.faults) <= set(FAULTS) or len(set(settings.faults)) < len(settings.faults):
+        raise TwinError(
+            f"joint: faults are {', '.join(settings.faults)}; allowed: each at most once of "
+            f"{', '.join(FAULTS)}"
         )
     if noise_sd.shape != (len(OUTPUTS),) or not (np.isnan(noise_sd) | (noise_sd > 0.0)).all():
         raise TwinError(

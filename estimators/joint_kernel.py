@@ -62,7 +62,9 @@ class Setup(NamedTuple):
     watch: int  # blocks of driving after a standstill in which such a change is looked for
     settle: int  # blocks of driving before the first
     change_memory: float  # of what contradicts [s]
-    surprise: float  # least statistic of a change, chi-square of l degrees of freedom if there is none
+    surprise: (
+        float  # least statistic of a change, chi-square of l degrees of freedom if there is none
+    )
     least_change: float  # and least change of any of them, of its prior sd
     dt: float  # of a sample [s]
 
