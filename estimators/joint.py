@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimators import joint_kernel
 from estimators.estimate import Estimate
-from estimators.joint_kernel import RING, Log, Memory, Setup
+from estimators.joint_memory import RING, Log, Memory, Setup
 from estimators.observer import check_drive, check_measurements
 from twin import (
     LOAD,
@@ -168,7 +168,7 @@ class JointObserver:
         first = self.fleet.twins[0]
         self.dt = first.dt
         self._setup = Setup(
-            index=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
+            parameter=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             offset=np.array([OFFSETS[name] for name in names]),
             fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
             step_limit=settings.step * self._prior,
@@ -197,7 +197,7 @@ class JointObserver:
         self._memory = Memory(
             theta=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
-            count=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
+            present=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
             excitation=np.zeros((2, 4)),
             information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
             ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
@@ -230,13 +230,13 @@ class JointObserver:
                     f"joint: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
                 )
             memory.theta[PARAMETERS.index(name)] = value
-        memory.z[: self._setup.index.size] = memory.theta[self._setup.index]
+        memory.z[: self._setup.parameter.size] = memory.theta[self._setup.parameter]
         memory.covariance[:] = np.diag(self._prior**2)
         memory.doubt[:] = self.settings.doubt
         for i, twin in enumerate(self.fleet.twins):
             p = memory.theta.copy()
             if i > 0:
-                p[self._setup.index[i - 1]] += self._setup.offset[i - 1]
+                p[self._setup.parameter[i - 1]] += self._setup.offset[i - 1]
             twin.set_parameters(p)
             twin.reset(speed, road)
 
@@ -264,7 +264,9 @@ class JointObserver:
         """Everything that decides the future; a run from it is bit-exact."""
         return JointSnapshot(
             tuple(twin.snapshot() for twin in self.fleet.twins),
-            Memory(*(array.copy() for array in self._memory)),
+            self._memory._replace(
+                **{name: array.copy() for name, array in self._memory._asdict().items()}
+            ),
         )
 
     def restore(self, snapshot: JointSnapshot) -> None:
@@ -301,7 +303,7 @@ class JointObserver:
             outputs=np.empty((n, len(OUTPUTS))),
             extended=np.empty((n, *twin.car.tyre_output.shape)),
             sd=np.empty((n, q)),
-            faults=np.empty((n, q - self._setup.index.size)),
+            faults=np.empty((n, q - self._setup.parameter.size)),
             changes=np.empty(n, dtype=np.int64),
         )
         done = joint_kernel.run(

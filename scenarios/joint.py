@@ -15,17 +15,19 @@ from numpy.typing import NDArray
 
 from estimators.identifiability import report
 from estimators.joint import JointEstimate, JointObserver, JointSettings
+from estimators.limits import limits
 from estimators.score import settling_time
 from scenarios import joint_drives
 from scenarios.catalogue import Scenario, Settings
+from scenarios.limits import sensitivity_at_truth
 from scenarios.manoeuvres import urban
 from scenarios.mismatch import MISMATCHES, real_drive, real_vehicle
-from scenarios.progress import parallel
+from scenarios.progress import parallel, progress
 from scenarios.record import Manoeuvre, record
 from scenarios.result import Result, Row
 from scenarios.study import REAL, TWIN, variation
 from scenarios.vehicles import SUV_LOADS
-from twin import LOAD, OUTPUTS, PARAMETERS, SCALES, Drive, Vehicle, parameter_deltas
+from twin import LOAD, OUTPUTS, PARAMETERS, SCALES, Drive, Vehicle, noise_sd, parameter_deltas
 
 Array = NDArray[np.float64]
 
@@ -39,6 +41,7 @@ LOAD_CHANGE = "load-change"
 GET_OUT = ("rear_left_passenger", "rear_right_passenger")  # 145 kg
 # A scale is said to be found to so many percent of itself; a load, of what the load changes
 SCALE_UNIT = 0.01
+BLOCK = 10  # samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,6 +149,23 @@ def score(run: Run) -> Score:
     )
 
 
+@cache
+def bound(drive: str, snr: float, duration: float | None) -> Array:
+    """(15,) the Cramer-Rao bound of all parameters together, of `same`, of perfect sensors.
+
+    Means of ten samples stand for them, as the observer takes them: a tenth of the memory.
+    """
+    clean = clean_drive(drive, "same", duration)
+    n = len(clean) // BLOCK * BLOCK
+    columns = [
+        sensitivity_at_truth(TWIN, clean, [name], variation())[0, :n]
+        for name in progress(PARAMETERS, "bound", len(PARAMETERS))
+    ]
+    means = np.array([c.reshape(-1, BLOCK, len(OUTPUTS)).mean(axis=1) for c in columns])
+    sd = noise_sd(clean.measurements, snr) / np.sqrt(BLOCK)
+    return limits(PARAMETERS, means, sd).joint
+
+
 def _units() -> Array:
     """(15,) what 100 % is."""
     return np.array([abs(variation()[n]) if n in LOAD else 100.0 * SCALE_UNIT for n in PARAMETERS])
@@ -158,25 +178,32 @@ def rows(
     seeds: Sequence[int],
     jobs: int,
     duration: float | None = None,
+    *,
+    with_bound: bool = False,
 ) -> list[Row]:
-    """All seeds of one drive of one real vehicle."""
+    """All seeds of one drive of one real vehicle; the Cramer-Rao bound takes a minute more."""
     todo = [Run(drive=drive, mismatch=mismatch, snr=snr, seed=s, duration=duration) for s in seeds]
     clean_drive(drive, mismatch, duration)
     scores = parallel(score, todo, jobs, f"{drive} {mismatch}")
     case = f"{drive}, {mismatch}"
     found: list[Row] = []
     covered = []
+    least = bound(drive, snr, duration) if with_bound else None
     for i, name in enumerate(PARAMETERS):
         one = partial(Row.over_seeds, case=case, quantity=name, estimator="joint")
         errors = np.array([s.error[i] for s in scores])
         sds = np.array([s.sd[i] for s in scores])
         covered.append(np.abs(errors) <= 2.0 * sds)
+        limit = None if least is None else float(100.0 * least[i] / _units()[i])
         found += [
-            one(100.0 * np.abs(errors) / _units()[i], metric="pct", unit="%"),
+            one(100.0 * np.abs(errors) / _units()[i], metric="pct", unit="%", limit=limit),
             one(100.0 * sds / _units()[i], metric="claimed_sd_pct", unit="%"),
             _single(case, name, "rmse_over_sd", np.sqrt(np.mean((errors / sds) ** 2)), len(seeds)),
             _single(case, name, "valid", np.mean([s.valid[i] for s in scores]), len(seeds)),
         ]
+        if least is not None:
+            ratio = np.sqrt(np.mean(errors**2)) / least[i]
+            found.append(_single(case, name, "rms_over_limit", ratio, len(seeds)))
         if name in LOAD and drive != LOAD_CHANGE:
             found.append(one([s.time[i] for s in scores], metric="time_to_10pct", unit="s"))
     found.append(_single(case, "all", "coverage", np.mean(covered), len(seeds)))
@@ -189,7 +216,7 @@ def rows(
     return found
 
 
-def _single(case: str, quantity: str, metric: str, value: float, seeds: int) -> Row:
+def _single(case: str, quantity: str, metric: str, value: float | np.floating, seeds: int) -> Row:
     """A figure that all seeds make together."""
     return Row(
         case=case, quantity=quantity, metric=metric, unit="1", estimator="joint", seeds=seeds,
