@@ -39,8 +39,6 @@ MANOEUVRES: dict[str, Callable[[float | None], Manoeuvre]] = {
 }
 LOAD_CHANGE = "load-change"
 GET_OUT = ("rear_left_passenger", "rear_right_passenger")  # 145 kg
-# A scale is said to be found to so many percent of itself; a load, of what the load changes
-SCALE_UNIT = 0.01
 BLOCK = 10  # samples
 
 
@@ -167,8 +165,8 @@ def bound(drive: str, snr: float, duration: float | None) -> Array:
 
 
 def _units() -> Array:
-    """(15,) what 100 % is."""
-    return np.array([abs(variation()[n]) if n in LOAD else 100.0 * SCALE_UNIT for n in PARAMETERS])
+    """(15,) what 100 % is: of a load what it changes, of a scale its nominal value."""
+    return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in PARAMETERS])
 
 
 def rows(

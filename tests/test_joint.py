@@ -155,6 +155,16 @@ def test_noise_of_nothing_is_refused():
         JointObserver(Vehicle.load("suv"), np.zeros(10), JointSettings(parameters=("mass",)))
 
 
+def test_rows_tell_error_claim_and_validity_of_every_parameter():
+    rows = joint.rows("mixed", "all-scales", 10.0, [0], 1, 3.0)
+    found = {(row.quantity, row.metric): row.median for row in rows}
+    for name in PARAMETERS:
+        error, sd = found[name, "pct"], found[name, "claimed_sd_pct"]
+        assert found[name, "rmse_over_sd"] == pytest.approx(error / sd)
+        assert found[name, "valid"] in (0.0, 1.0)
+    assert 0.0 <= found["all", "coverage"] <= 1.0
+
+
 @pytest.mark.slow
 def test_change_of_load_is_found_and_nothing_else_thrown_off():
     score = joint.score(Run(drive="load-change", mismatch="same", snr=10.0, seed=0))
