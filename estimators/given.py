@@ -24,8 +24,10 @@ def given_by(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> Gi
     """Inputs and measurements in the twin's order.
 
     Raises:
-        TwinError: the drive has others than the twin needs.
+        TwinError: the drive has others than the twin needs, or another sample time.
     """
+    if abs(drive.dt - twin.dt) > 1e-9:
+        raise TwinError(f"drive: has samples every {drive.dt} s, the twin steps {twin.dt} s")
     ny = len(twin.outputs)
     torqueless = tuple(name for name in twin.inputs if name not in TORQUES)
     has = (*drive.input_names, *drive.output_names)
@@ -51,3 +53,19 @@ def given_by(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> Gi
     inputs = np.zeros((len(drive), len(twin.inputs)))
     inputs[:, [twin.inputs.index(name) for name in torqueless]] = drive.inputs
     return Given(inputs, measurements, speed)
+
+
+def check_measurements(y: Array, names: tuple[str, ...], what: str, *, infinite: bool) -> None:
+    """Refuses measurements (n, ny) of another shape, and infinite ones unless they are allowed.
+
+    Raises:
+        TwinError: as said.
+    """
+    if y.shape[1:] != (len(names),):
+        raise TwinError(f"{what}: measurements have shape {y.shape}; allowed: (n, {len(names)})")
+    if np.isinf(y).any() and not infinite:
+        row, column = np.argwhere(np.isinf(y))[0]
+        raise TwinError(
+            f"{what}: {names[column]} is {y[row, column]} in sample {row}; allowed: finite "
+            "numbers, and NaN where there is no measurement"
+        )

@@ -389,8 +389,8 @@ def estimate(
     """Observe recorded drives: LOG is Parquet, CSV or MDF 4, or - for standard input.
 
     Of each LOG DIR receives NAME.ESTIMATOR.rrd, the timeline; .parquet, the estimates over time;
-    and .json, the result. A second call skips what is finished there, unless the log, the map, the car
-    or a version has changed. Truth in a log is only scored against. A bad log does not stop the
+    and .json, the result. A second call skips what is finished there, unless the log, the map, the
+    car or a version has changed. Truth in a log is only scored against. A bad log does not stop the
     others; the exit status is then 2.
 
     From standard input come samples, one JSON object a line or CSV with a row of names: time [s],
