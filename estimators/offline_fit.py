@@ -1,0 +1,148 @@
+"""Least squares over a whole recorded drive: what an observer could reach with all the time it has.
+
+The twin runs open loop over the drive, settled at the start under the parameters in question. The
+residuals are the differences of its outputs from the measured ones, block means in units of their
+noise, and the parameters themselves in units of their prior standard deviation; biases of the IMU
+enter as constants. Gauss-Newton steps within a trust region (scipy) take the Jacobian from runs of
+the black box with one parameter a little off. With white noise and the vehicle's own model this is
+the maximum a posteriori estimate, and the inverse of J'J its covariance.
+
+Nothing draws the twin to the measured speed. Where the torques are known badly it drifts away from
+the vehicle, and the fit then pays in its parameters.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimators.estimate import Estimate
+from estimators.joint import BIAS_SD, BIASES, OFFSETS, PRIOR_SD, JointEstimate
+from estimators.observer import Observer
+from twin import OUTPUTS, PARAMETERS, Drive, Twin, TwinError, Vehicle
+
+Array = NDArray[np.float64]
+
+# Samples per mean: at 1 kHz no motion of a car is faster than 10 ms by much
+BLOCK = 10
+# The fit ends once a step changes half the sum of squared residuals by less than this share: of
+# the 120000 block means of two minutes, less than a tenth of one squared residual
+TOLERANCE = 1e-6
+MOST_STEPS = 20
+
+
+def offline_fit(
+    vehicle: Vehicle,
+    drive: Drive,
+    noise_sd: ArrayLike,
+    parameters: Sequence[str] = PARAMETERS,
+    *,
+    speed: float,
+    biases: bool = True,
+    prior_sd: Mapping[str, float] | None = None,
+) -> JointEstimate:
+    """Fits parameters of the twin to a whole drive.
+
+    Args:
+        vehicle: of the twin.
+        drive: of N samples.
+        noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
+        parameters: of `twin.PARAMETERS`, p of them; the others stay nominal.
+        speed: at the start [m/s].
+        biases: whether those of the IMU's six channels are fitted along.
+        prior_sd: by parameter, instead of `estimators.joint.PRIOR_SD`.
+
+    Returns:
+        The run of the twin with the fitted parameters, the same in all samples.
+
+    Raises:
+        TwinError: a name is unknown, the drive does not fit the twin, or the twin blew up.
+    """
+    from scipy.optimize import least_squares  # not at the top: it takes its time
+
+    unknown = [name for name in parameters if name not in PARAMETERS]
+    if unknown:
+        raise TwinError(
+            f"fit: parameter {unknown[0]!r} is unknown; allowed: {', '.join(PARAMETERS)}"
+        )
+    prior = PRIOR_SD | dict(prior_sd or {})
+    scale = np.array([prior[name] for name in parameters] + (list(BIAS_SD) if biases else []))
+    offset = np.array([OFFSETS[name] for name in parameters])
+    measured = _measured(drive, np.asarray(noise_sd, dtype=np.float64))
+    observer, p = Observer(Twin(vehicle), []), len(parameters)
+    last: dict[bytes, Estimate] = {}
+
+    def simulate(theta: Array) -> Estimate:
+        observer.reset(speed, dict(zip(parameters, theta.tolist(), strict=True)))
+        return observer.run(drive)
+
+    def run(theta: Array) -> Estimate:
+        if theta.tobytes() not in last:
+            last.clear()
+            last[theta.tobytes()] = simulate(theta)
+        return last[theta.tobytes()]
+
+    def residuals(x: Array) -> Array:
+        z = x * scale
+        found = _block_means(run(z[:p]).outputs)
+        found[:, : z.size - p] += z[p:]
+        return np.append(((found - measured.mean) * measured.weight).ravel(), x)
+
+    def jacobian(x: Array) -> Array:
+        theta = x[:p] * scale[:p]
+        middle = _block_means(run(theta).outputs)
+        columns = [
+            (_block_means(simulate(theta + h * step).outputs) - middle) / h
+            for h, step in zip(offset, np.eye(p), strict=True)
+        ]
+        columns += [np.broadcast_to(row, middle.shape) for row in np.eye(len(OUTPUTS))[: x.size - p]]
+        stacked = [(c * measured.weight * s).ravel() for c, s in zip(columns, scale, strict=True)]
+        return np.vstack([np.column_stack(stacked), np.eye(x.size)])
+
+    solution = least_squares(
+        residuals, np.zeros(scale.size), jac=jacobian, ftol=TOLERANCE, max_nfev=MOST_STEPS
+    )
+    slopes = solution.jac[: -scale.size] / scale
+    information = slopes.T @ slopes
+    covariance = np.linalg.inv(np.eye(scale.size) + information * np.outer(scale, scale))
+    covariance *= np.outer(scale, scale)
+    estimate, n = run(solution.x[:p] * scale[:p]), len(drive)
+    return JointEstimate(
+        time=estimate.time,
+        states=estimate.states,
+        parameters=estimate.parameters,
+        outputs=estimate.outputs,
+        extended=estimate.extended,
+        nominal=estimate.nominal,
+        estimated=(*parameters, *(f"bias_{name}" for name in BIASES[: scale.size - p])),
+        sd=np.broadcast_to(np.sqrt(np.diag(covariance)), (n, scale.size)),
+        biases=np.broadcast_to(solution.x[p:] * scale[p:], (n, scale.size - p)),
+        covariance=covariance,
+        information=information,
+    )
+
+
+class _Measured(NamedTuple):
+    """Block means (M, ny) and the inverse of their standard deviation; zero: nothing measured."""
+
+    mean: Array
+    weight: Array
+
+
+def _measured(drive: Drive, sd: Array) -> _Measured:
+    if sd.shape != (len(OUTPUTS),) or not (np.isnan(sd) | (sd > 0.0)).all():
+        raise TwinError(
+            f"fit: noise_sd is {sd.tolist()}; allowed: {len(OUTPUTS)} numbers above zero, NaN for "
+            "a channel that is not used"
+        )
+    # A block lacks a channel as soon as one of its samples does: its mean would not be the twin's
+    mean = _block_means(drive.measurements)
+    weight = np.sqrt(BLOCK) / sd
+    return _Measured(np.nan_to_num(mean), np.nan_to_num(np.where(np.isnan(mean), 0.0, weight)))
+
+
+def _block_means(values: Array) -> Array:
+    """(M, k) means of (N, k) values; a last block that is not full is left out."""
+    m = len(values) // BLOCK
+    return values[: m * BLOCK].reshape(m, BLOCK, -1).mean(axis=1)
