@@ -3,20 +3,35 @@
 See `estimators.joint_kernel` for the method, and `JointSettings` for what can be chosen.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators import joint_kernel
 from estimators.estimate import Estimate
-from estimators.joint_kernel import Log, Memory, Setup
-from twin import OUTPUTS, PARAMETERS, SCALES, Drive, Fleet, Snapshot, TwinError, Vehicle, check_inputs
+from estimators.observer import check_drive, check_measurements
+from estimators.joint_kernel import RING, Log, Memory, Setup
+from twin import (
+    LOAD,
+    OUTPUTS,
+    PARAMETERS,
+    SCALES,
+    Drive,
+    Fleet,
+    Snapshot,
+    TwinError,
+    Vehicle,
+    check_inputs,
+)
 
 Array = NDArray[np.float64]
 
-BIASES = OUTPUTS[:6]
+# What is estimated of the sensors: biases of the IMU, the delay of all signals, the IMU's position
+# beside where the twin has it. None of them needs a twin.
+FAULTS = (*(f"bias_{name}" for name in OUTPUTS[:6]), "delay", "imu_x", "imu_y", "imu_z")
 # Standard deviations before the first sample: a full car more or less, its CM anywhere between the
 # seats, and a model of tyres and springs from a data sheet
 PRIOR_SD = {
@@ -27,8 +42,10 @@ PRIOR_SD = {
     **dict.fromkeys(SCALES, 0.15),
     "drag": 0.3,
 }
-# Of a sensor's bias: a cheap IMU [m/s2, rad/s]
-BIAS_SD = (0.1, 0.1, 0.1, 0.005, 0.005, 0.005)
+# A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m]
+FAULT_SD = dict(
+    zip(FAULTS, (0.1, 0.1, 0.1, 0.005, 0.005, 0.005, 0.01, 0.07, 0.07, 0.07), strict=True)
+)
 # How far each twin is off: as in `estimators.limits`, large beside rounding, small beside curvature
 OFFSETS = {
     "mass": 10.0,
@@ -46,10 +63,19 @@ class JointSettings:
 
     Attributes:
         parameters: of `twin.PARAMETERS`, one twin for each.
-        biases: whether those of the IMU's six channels are estimated along; they need no twin.
+        faults: of `FAULTS`, what is estimated of the sensors along.
         prior_sd: by parameter, instead of `PRIOR_SD`.
         noise_factor: by which the noise's variance is taken larger than it is, for what the
             linearisation leaves out.
+        doubt: by which it is first taken larger besides, until innovations prove to be white.
+        doubt_memory: how fast that is seen [s].
+        watch: seconds of driving after a standstill in which a change of the load is looked for.
+        settle: seconds of driving before the first standstill at which the load can change.
+        change_memory: how far back what contradicts the load is looked at [s].
+        surprise: least statistic of a change: chi-square, one degree of freedom for each parameter
+            of the load, as long as there is none and the model is right.
+        least_change: of some parameter of the load, in its prior sd; less is no change of load.
+        valid_share: of its prior sd that an estimate's sd has to be below to count as valid.
         drift: share of its prior sd that a parameter may wander over a second.
         step: largest share of its prior sd by which an estimate moves in a block.
         hold_off: seconds before the first correction.
@@ -60,9 +86,17 @@ class JointSettings:
     """
 
     parameters: tuple[str, ...] = PARAMETERS
-    biases: bool = True
+    faults: tuple[str, ...] = FAULTS
     prior_sd: Mapping[str, float] = field(default_factory=dict)
-    noise_factor: float = 1.5
+    noise_factor: float = 1.0
+    doubt: float = 3.0
+    doubt_memory: float = 10.0
+    watch: float = 20.0
+    settle: float = 5.0
+    change_memory: float = 2.0
+    surprise: float = 200.0
+    least_change: float = 0.15
+    valid_share: float = 0.2
     drift: float = 0.001
     step: float = 0.1
     hold_off: float = 1.0
@@ -76,18 +110,32 @@ class JointEstimate(Estimate):
     """A run of the joint observer.
 
     Attributes:
-        estimated: p names of what was estimated, in the order of `covariance`; biases follow.
+        estimated: p names of what was estimated, in the order of `covariance`; faults follow.
+        prior: (p + b,) standard deviations before the first sample.
         sd: (N, p + b) standard deviation of each estimate.
-        biases: (N, b) [m/s2, rad/s].
+        valid: (N, p + b) whether the drive has told it.
+        changes: (N,) of the load that were found until then.
+        faults: (N, b) of the sensors, in the order of `JointSettings.faults`.
         covariance: (p + b, p + b) at the end.
         information: (p + b, p + b) Fisher's, of all that was used.
     """
 
     estimated: tuple[str, ...]
+    fault_names: tuple[str, ...]
+    prior: Array
     sd: Array
-    biases: Array
+    valid: NDArray[np.bool_]
+    changes: NDArray[np.int64]
+    faults: Array
     covariance: Array
     information: Array
+
+
+class JointSnapshot(NamedTuple):
+    """Everything that decides a joint observer's future."""
+
+    twins: tuple[Snapshot, ...]
+    memory: Memory
 
 
 class JointObserver:
@@ -109,17 +157,17 @@ class JointObserver:
         names = settings.parameters
         _check(settings, np.asarray(noise_sd, dtype=np.float64))
         self.fleet = Fleet(vehicle, len(names) + 1)
-        self.estimated = (*names, *(f"bias_{name}" for name in BIASES if settings.biases))
+        self.estimated = (*names, *settings.faults)
         prior = PRIOR_SD | dict(settings.prior_sd)
         self._prior = np.array(
-            [prior[name] for name in names] + (list(BIAS_SD) if settings.biases else [])
+            [prior[name] for name in names] + [FAULT_SD[name] for name in settings.faults]
         )
         first = self.fleet.twins[0]
         self.dt = first.dt
         self._setup = Setup(
             index=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             offset=np.array([OFFSETS[name] for name in names]),
-            bias_output=np.arange(len(self.estimated) - len(names)),
+            fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
             step_limit=settings.step * self._prior,
             drift=(settings.drift * self._prior) ** 2,
             noise=settings.noise_factor * np.asarray(noise_sd, dtype=np.float64) ** 2,
@@ -130,6 +178,15 @@ class JointObserver:
             least_excitation=settings.least_excitation,
             rate_weight=900.0,
             memory=1.0,
+            doubt=settings.doubt,
+            doubt_memory=settings.doubt_memory,
+            prior=self._prior.copy(),
+            load=np.array([i for i, n in enumerate(names) if n in LOAD], dtype=np.int64),
+            watch=round(settings.watch / (settings.block * self.dt)),
+            settle=round(settings.settle / (settings.block * self.dt)),
+            change_memory=settings.change_memory,
+            surprise=settings.surprise,
+            least_change=settings.least_change,
             dt=self.dt,
         )
         n, p, q = len(self.fleet), len(PARAMETERS), self._prior.size
@@ -138,8 +195,13 @@ class JointObserver:
             theta=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
             count=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
-            excitation=np.zeros((2, 4)), innovation=np.zeros(ny), expected=np.zeros(ny),
-            information=np.zeros((q, q)), clock=np.zeros(2, dtype=np.int64),
+            excitation=np.zeros((2, 4)),
+            information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
+            ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
+            doubt=np.zeros(ny), window=np.zeros((3, ny)), window_h=np.zeros((ny, q)),
+            recent=np.zeros((q, q)), score=np.zeros(q), kept=np.zeros(q),
+            kept_covariance=np.zeros((q, q)), kept_doubt=np.zeros(ny),
+            blocks=np.zeros(2, dtype=np.int64), changes=np.zeros(1, dtype=np.int64),
         )  # fmt: skip
         self.reset(0.0)
 
@@ -167,6 +229,7 @@ class JointObserver:
             memory.theta[PARAMETERS.index(name)] = value
         memory.z[: self._setup.index.size] = memory.theta[self._setup.index]
         memory.covariance[:] = np.diag(self._prior**2)
+        memory.doubt[:] = self.settings.doubt
         for i, twin in enumerate(self.fleet.twins):
             p = memory.theta.copy()
             if i > 0:
@@ -174,21 +237,69 @@ class JointObserver:
             twin.set_parameters(p)
             twin.reset(speed, road)
 
+    @property
+    def covariance(self) -> Array:
+        """(p + b, p + b) of `estimated`, now."""
+        return self._memory.covariance.copy()
+
+    def update(self, u: ArrayLike, y: ArrayLike) -> Array:
+        """Takes one sample of inputs (13,) and measurements (10,); returns the parameters (15,).
+
+        Raises:
+            TwinError: a value is not finite or out of range, or a twin has blown up.
+        """
+        u = np.ascontiguousarray(u, dtype=np.float64)
+        y = np.ascontiguousarray(y, dtype=np.float64)
+        check_inputs(u[None], "update")
+        check_measurements(y[None], OUTPUTS, "update")
+        joint_kernel.update(self.fleet.cars, self._setup, self._memory, u, y)
+        for twin in self.fleet.twins:
+            twin.check()
+        return self._memory.theta.copy()
+
+    def snapshot(self) -> JointSnapshot:
+        """Everything that decides the future; a run from it is bit-exact."""
+        return JointSnapshot(
+            tuple(twin.snapshot() for twin in self.fleet.twins),
+            Memory(*(array.copy() for array in self._memory)),
+        )
+
+    def restore(self, snapshot: JointSnapshot) -> None:
+        """Goes back to a snapshot of an observer with the same settings and vehicle.
+
+        Raises:
+            TwinError: it estimates something else.
+        """
+        if snapshot.memory.out.shape != self._memory.out.shape or (
+            snapshot.memory.z.shape != self._memory.z.shape
+        ):
+            raise TwinError(
+                f"joint: the snapshot has {snapshot.memory.z.size} estimates of "
+                f"{len(snapshot.twins)} twins; allowed: {self._memory.z.size} of {len(self.fleet)}"
+            )
+        for twin, kept in zip(self.fleet.twins, snapshot.twins, strict=True):
+            twin.restore(kept)
+        for array, kept in zip(self._memory, snapshot.memory, strict=True):
+            array[:] = kept
+
     def run(self, drive: Drive) -> JointEstimate:
         """Observes a whole drive, from the state that the observer is in.
 
         Raises:
             TwinError: the drive does not fit the twins, or a twin has blown up.
         """
+        twin = self.fleet.twins[0]
+        check_drive(drive, twin)
         check_inputs(drive.inputs, "drive")
-        n, twin, q = len(drive), self.fleet.twins[0], self._prior.size
+        n, q = len(drive), self._prior.size
         log = Log(
             states=np.empty((n, len(twin.states))),
             parameters=np.empty((n, len(PARAMETERS))),
             outputs=np.empty((n, len(OUTPUTS))),
             extended=np.empty((n, *twin.car.tyre_output.shape)),
             sd=np.empty((n, q)),
-            biases=np.empty((n, q - self._setup.index.size)),
+            faults=np.empty((n, q - self._setup.index.size)),
+            changes=np.empty(n, dtype=np.int64),
         )
         done = joint_kernel.run(
             self.fleet.cars, self._setup, self._memory, drive.inputs, drive.measurements, log
@@ -203,8 +314,12 @@ class JointObserver:
             extended=log.extended.reshape(n, -1),
             nominal=self._setup.nominal.copy(),
             estimated=self.estimated,
+            fault_names=self.settings.faults,
+            prior=self._prior.copy(),
             sd=log.sd,
-            biases=log.biases,
+            valid=log.sd < self.settings.valid_share * self._prior,
+            changes=log.changes,
+            faults=log.faults,
             covariance=self._memory.covariance.copy(),
             information=self._memory.information.copy(),
         )

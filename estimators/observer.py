@@ -98,7 +98,7 @@ class Observer:
         """
         self._memory.u[:] = u
         y = np.ascontiguousarray(y, dtype=np.float64)
-        _check_measurements(y[None], self.twin.outputs, "update")
+        check_measurements(y[None], self.twin.outputs, "update")
         if isinstance(self.twin, Twin):
             check_inputs(self._memory.u[None], "update")
             _update(self.twin.car, self._gains, self._laws, self._memory, y)
@@ -114,16 +114,7 @@ class Observer:
             TwinError: the drive has other channels or another sample time than the twin, a value is
                 not finite or out of range, or the twin has blown up.
         """
-        if (drive.input_names, drive.output_names) != (self.twin.inputs, self.twin.outputs):
-            raise TwinError(
-                f"drive: has channels {drive.input_names + drive.output_names}, the twin needs "
-                f"{self.twin.inputs + self.twin.outputs} in this order"
-            )
-        if abs(drive.dt - self.twin.dt) > 1e-9:
-            raise TwinError(
-                f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s"
-            )
-        _check_measurements(drive.measurements, self.twin.outputs, "drive")
+        check_drive(drive, self.twin)
         if isinstance(self.twin, Twin):
             return self._run_compiled(self.twin, drive)
         return self._run_black_box(drive)
@@ -264,7 +255,28 @@ def _index(name: str, names: tuple[str, ...], kind: str) -> int:
     return names.index(name)
 
 
-def _check_measurements(y: Array, names: tuple[str, ...], what: str) -> None:
+def check_drive(drive: Drive, twin: BlackBox) -> None:
+    """Refuses a drive that does not fit a twin.
+
+    Raises:
+        TwinError: other channels or another sample time than the twin, or infinite measurements.
+    """
+    if (drive.input_names, drive.output_names) != (twin.inputs, twin.outputs):
+        raise TwinError(
+            f"drive: has channels {drive.input_names + drive.output_names}, the twin needs "
+            f"{twin.inputs + twin.outputs} in this order"
+        )
+    if abs(drive.dt - twin.dt) > 1e-9:
+        raise TwinError(f"drive: has samples every {drive.dt} s, the twin steps {twin.dt} s")
+    check_measurements(drive.measurements, twin.outputs, "drive")
+
+
+def check_measurements(y: Array, names: tuple[str, ...], what: str) -> None:
+    """Refuses measurements (n, ny) that are infinite; NaN is no measurement.
+
+    Raises:
+        TwinError: as said, or another shape.
+    """
     if y.shape[1:] != (len(names),):
         raise TwinError(f"{what}: measurements have shape {y.shape}; allowed: (n, {len(names)})")
     if np.isinf(y).any():
