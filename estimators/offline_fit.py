@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators.estimate import Estimate
-from estimators.joint import BIAS_SD, BIASES, OFFSETS, PRIOR_SD, JointEstimate
+from estimators.joint import OFFSETS, PRIOR_SD
 from estimators.observer import Observer
+from estimators.parameter_estimate import ParameterEstimate
+from estimators.unscented import BIAS_SD
 from twin import OUTPUTS, PARAMETERS, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
@@ -39,9 +41,8 @@ def offline_fit(
     parameters: Sequence[str] = PARAMETERS,
     *,
     speed: float,
-    biases: bool = True,
     prior_sd: Mapping[str, float] | None = None,
-) -> JointEstimate:
+) -> ParameterEstimate:
     """Fits parameters of the twin to a whole drive.
 
     Args:
@@ -50,7 +51,6 @@ def offline_fit(
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
         parameters: of `twin.PARAMETERS`, p of them; the others stay nominal.
         speed: at the start [m/s].
-        biases: whether those of the IMU's six channels are fitted along.
         prior_sd: by parameter, instead of `estimators.joint.PRIOR_SD`.
 
     Returns:
@@ -67,7 +67,7 @@ def offline_fit(
             f"fit: parameter {unknown[0]!r} is unknown; allowed: {', '.join(PARAMETERS)}"
         )
     prior = PRIOR_SD | dict(prior_sd or {})
-    scale = np.array([prior[name] for name in parameters] + (list(BIAS_SD) if biases else []))
+    scale = np.array([*(prior[name] for name in parameters), *BIAS_SD])
     offset = np.array([OFFSETS[name] for name in parameters])
     measured = _measured(drive, np.asarray(noise_sd, dtype=np.float64))
     observer, p = Observer(Twin(vehicle), []), len(parameters)
@@ -96,7 +96,9 @@ def offline_fit(
             (_block_means(simulate(theta + h * step).outputs) - middle) / h
             for h, step in zip(offset, np.eye(p), strict=True)
         ]
-        columns += [np.broadcast_to(row, middle.shape) for row in np.eye(len(OUTPUTS))[: x.size - p]]
+        columns += [
+            np.broadcast_to(row, middle.shape) for row in np.eye(len(OUTPUTS))[: x.size - p]
+        ]
         stacked = [(c * measured.weight * s).ravel() for c, s in zip(columns, scale, strict=True)]
         return np.vstack([np.column_stack(stacked), np.eye(x.size)])
 
@@ -107,19 +109,16 @@ def offline_fit(
     information = slopes.T @ slopes
     covariance = np.linalg.inv(np.eye(scale.size) + information * np.outer(scale, scale))
     covariance *= np.outer(scale, scale)
-    estimate, n = run(solution.x[:p] * scale[:p]), len(drive)
-    return JointEstimate(
+    estimate = run(solution.x[:p] * scale[:p])
+    return ParameterEstimate(
         time=estimate.time,
         states=estimate.states,
         parameters=estimate.parameters,
         outputs=estimate.outputs,
         extended=estimate.extended,
         nominal=estimate.nominal,
-        estimated=(*parameters, *(f"bias_{name}" for name in BIASES[: scale.size - p])),
-        sd=np.broadcast_to(np.sqrt(np.diag(covariance)), (n, scale.size)),
-        biases=np.broadcast_to(solution.x[p:] * scale[p:], (n, scale.size - p)),
-        covariance=covariance,
-        information=information,
+        estimated=tuple(parameters),
+        sd=np.broadcast_to(np.sqrt(np.diag(covariance))[:p], (len(drive), p)),
     )
 
 

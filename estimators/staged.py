@@ -25,11 +25,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators import staged_kernel
-from estimators.estimate import Estimate
-from estimators.joint import JointObserver, JointSettings
+from estimators.joint import PRIOR_SD
 from estimators.law import ParameterLaw, compile_laws
-from estimators.staged_kernel import Log, Machine, Progress
-from twin import OUTPUTS, PARAMETERS, Drive, TwinError, Vehicle, check_inputs
+from estimators.parameter_estimate import ParameterEstimate
+from estimators.side_by_side import new_block
+from estimators.staged_kernel import Log, Memory, Setup
+from estimators.unscented import BIAS_SD, BLOCK, SPEED_GAIN, STEP
+from twin import OUTPUTS, PARAMETERS, STATES, Drive, Fleet, TwinError, Vehicle, check_inputs
 
 Array = NDArray[np.float64]
 
@@ -59,8 +61,8 @@ class StagedSettings:
         corner: of the quasi-static range [Hz].
     """
 
-    mass_seconds: float = 10.0
-    pitch_seconds: float = 10.0
+    mass_seconds: float = 5.0
+    pitch_seconds: float = 5.0
     cm_seconds: float = 15.0
     straight: float = 0.05
     loaded: float = 1.0
@@ -74,18 +76,14 @@ class StagedSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StagedEstimate(Estimate):
-    """A run of the staged observer.
+class StagedEstimate(ParameterEstimate):
+    """A run of the staged observer; each fit claims its sd as if all else were right.
 
     Attributes:
         stage: (N,) of `Stage`.
-        estimated: names of what is estimated, in the order of `sd`.
-        sd: (N, len(estimated)) standard deviation that each fit claims, all else being right.
     """
 
     stage: NDArray[np.int64]
-    estimated: tuple[str, ...]
-    sd: Array
 
 
 def staged(
@@ -93,7 +91,7 @@ def staged(
     drive: Drive,
     noise_sd: ArrayLike,
     laws: Sequence[ParameterLaw],
-    settings: StagedSettings = StagedSettings(),  # noqa: B008
+    settings: StagedSettings = StagedSettings(),
     *,
     speed: float,
 ) -> StagedEstimate:
@@ -114,13 +112,15 @@ def staged(
     if sorted(named) != ["Jxx", "Jyy", "Jzz", "mass"]:
         raise TwinError(f"staged: laws are of {', '.join(named)}; allowed: mass, Jxx, Jyy, Jzz")
     check_inputs(drive.inputs, "drive")
-    sd = np.where(np.isin(OUTPUTS, QUASI_STATIC), noise_sd, np.nan)
-    chosen = JointSettings(parameters=CM, hold_off=0.0, least_excitation=0.0)
-    joint = JointObserver(vehicle, sd, chosen)
-    joint.reset(speed, road=drive.inputs[0, 9:13])
-    setup, memory, twin = joint._setup, joint._memory, joint.fleet.twins[0]
+    fleet, road = Fleet(vehicle, 1 + len(CM)), drive.inputs[0, 9:13]
+    twin = fleet.twins[0]
+    theta = np.zeros(len(PARAMETERS))
+    staged_kernel.set_all(fleet.cars, theta)
+    for each in fleet.twins:
+        each.reset(speed, road)
     table, law_memory = compile_laws(laws, twin.dt)
-    machine = Machine(
+    prior = np.array([*(PRIOR_SD[name] for name in CM), *BIAS_SD])
+    setup = Setup(
         seconds=np.array(
             [settings.mass_seconds, settings.pitch_seconds, settings.cm_seconds, np.inf]
         ),
@@ -129,17 +129,26 @@ def staged(
         loaded=settings.loaded,
         quasi_static=1.0 / (2.0 * np.pi * settings.corner),
         least_wheel_speed=3.0,  # rad/s, 1 m/s, as in the mass law
+        noise=np.where(np.isin(OUTPUTS, QUASI_STATIC), noise_sd, np.nan) ** 2,
+        step_limit=STEP * prior,
+        block=BLOCK,
+        speed_gain=SPEED_GAIN,
+        dt=twin.dt,
     )
-    progress = Progress(
+    memory = Memory(
         stage=np.zeros(1, dtype=np.int64),
         clock=np.zeros(4),
         yaw_rate=np.zeros(1),
-        slow=np.zeros((2, len(joint.fleet) + 1, len(OUTPUTS))),
+        theta=theta,
         laws=law_memory,
+        z=np.zeros(prior.size),
+        covariance=np.diag(prior**2),
+        slow=np.zeros((2, len(fleet) + 1, len(OUTPUTS))),
+        begun=np.zeros(1, dtype=np.int64),
     )
     n = len(drive)
     log = Log(
-        states=np.empty((n, len(twin.states))),
+        states=np.empty((n, len(STATES))),
         parameters=np.empty((n, len(PARAMETERS))),
         outputs=np.empty((n, len(OUTPUTS))),
         extended=np.empty((n, *twin.car.tyre_output.shape)),
@@ -147,7 +156,7 @@ def staged(
         sd=np.empty((n, len(laws) + len(CM))),
     )
     done = staged_kernel.run(
-        joint.fleet.cars, setup, memory, machine, progress, table,
+        fleet.cars, setup, memory, new_block(len(fleet)), table,
         drive.inputs, drive.measurements, log,
     )  # fmt: skip
     if done < n:
@@ -158,7 +167,7 @@ def staged(
         parameters=log.parameters,
         outputs=log.outputs,
         extended=log.extended.reshape(n, -1),
-        nominal=setup.nominal.copy(),
+        nominal=twin.car.nominal.copy(),
         stage=log.stage,
         estimated=(*named, *CM),
         sd=log.sd,

@@ -12,33 +12,37 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimators.joint_kernel import (
-    AX,
-    AY,
-    BLOCKS,
-    NY,
-    SAMPLES,
-    _estimate,
-    _follow_speed,
-    _sensitivity,
-)
 from estimators.law import advance_law
+from estimators.side_by_side import (
+    ABSENT,
+    IMU,
+    NX,
+    NY,
+    ROLL,
+    WHEEL_SPEED,
+    advance,
+    follow_speed,
+    kalman_step,
+    move_states,
+)
 from twin import OUTPUTS, PARAMETERS
-from twin.kernel import is_sound, read_states, set_parameters, step
+from twin.kernel import is_sound, read_states, set_parameters
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 MASS, PITCH, CM, ROLL_YAW = range(4)
-YAW_RATE, WHEEL_SPEED = OUTPUTS.index("yaw_rate"), OUTPUTS.index("wheel_speed_fl")
+AX, AY, YAW_RATE = (OUTPUTS.index(name) for name in ("ax", "ay", "yaw_rate"))
+CM_X = PARAMETERS.index("cm_x")  # cm_y and cm_z come after
 # The stage of each parameter that a law corrects; those of the CM have no law
 STAGE_OF = np.array(
     [{"mass": MASS, "Jyy": PITCH, "Jxx": ROLL_YAW, "Jzz": ROLL_YAW}.get(n, -1) for n in PARAMETERS]
 )
+OFFSET = 0.005  # of the CM of each twin [m], as in `estimators.limits`
 
 
-class Machine(NamedTuple):
-    """When which stage runs."""
+class Setup(NamedTuple):
+    """What does not change."""
 
     seconds: Array  # (4,) of each stage's own condition before the next one begins
     straight: float  # largest yaw rate of straight driving [rad/s]
@@ -46,146 +50,155 @@ class Machine(NamedTuple):
     loaded: float  # least quasi-static acceleration in the plane that tells of the CM [m/s2]
     quasi_static: float  # time constant of each of two low passes [s]
     least_wheel_speed: float  # of a car that moves [rad/s]
+    noise: Array  # (ny,) variance of a sample's noise; NaN: the CM's fit does not use the channel
+    step_limit: Array  # (9,) the most that CM and biases may move in a block
+    block: int  # samples
+    speed_gain: float  # of the twins' speeds [1/s]
+    dt: float  # of a sample [s]
 
 
-class Progress(NamedTuple):
-    """Where the machine stands, beside the joint observer's memory."""
+class Memory(NamedTuple):
+    """Where the machine stands, beside its four twins: at the estimate and off in one of the CM."""
 
     stage: Indices  # (1,)
     clock: Array  # (4,) seconds that each stage has run
     yaw_rate: Array  # (1,) low-passed [rad/s]
-    slow: Array  # (2, n + 1, ny) two low passes of the twins' outputs and, last, the measured ones
+    theta: Array  # (np,) parameters of twin 0
     laws: Array  # memory of each law
+    z: Array  # (9,) CM and biases of the IMU's channels
+    covariance: Array  # (9, 9)
+    slow: Array  # (2, 5, ny) two low passes of the twins' outputs and, last, the measured ones
+    begun: Indices  # (1,) whether these have
 
 
 @njit(cache=True, nogil=True)
-def _condition(machine, progress, y):
+def _condition(setup, memory, y):
     """Whether the drive is, now, what the stage wants."""
     for k in range(WHEEL_SPEED, WHEEL_SPEED + 4):
-        if y[k] < machine.least_wheel_speed:  # NaN is not
+        if y[k] < setup.least_wheel_speed:  # NaN is not
             return False
-    stage = progress.stage[0]
-    straight = abs(progress.yaw_rate[0]) < machine.straight
-    if stage == CM:
-        slow = progress.slow[1, 0]
-        return np.hypot(slow[AX], slow[AY]) >= machine.loaded
-    return not straight if stage == ROLL_YAW else straight
+    straight = abs(memory.yaw_rate[0]) < setup.straight
+    if memory.stage[0] == CM:
+        slow = memory.slow[1, 0]
+        return np.hypot(slow[AX], slow[AY]) >= setup.loaded
+    return not straight if memory.stage[0] == ROLL_YAW else straight
 
 
 @njit(cache=True, nogil=True)
-def _advance(machine, progress, y, dt):
+def _advance(setup, memory, y):
     """One sample of the machine; whether its stage is to estimate."""
     if not np.isnan(y[YAW_RATE]):
-        progress.yaw_rate[0] += dt / machine.yaw_filter * (y[YAW_RATE] - progress.yaw_rate[0])
-    active = _condition(machine, progress, y)
+        share = setup.dt / (setup.yaw_filter + setup.dt)
+        memory.yaw_rate[0] += share * (y[YAW_RATE] - memory.yaw_rate[0])
+    active, stage = _condition(setup, memory, y), memory.stage[0]
     if active:
-        stage = progress.stage[0]
-        progress.clock[stage] += dt
-        if stage < ROLL_YAW and progress.clock[stage] >= machine.seconds[stage]:
-            progress.stage[0] = stage + 1
+        memory.clock[stage] += setup.dt
+        if memory.clock[stage] >= setup.seconds[stage]:
+            memory.stage[0] = stage + 1
             return False
     return active
 
 
 @njit(cache=True, nogil=True)
-def _single_laws(cars, setup, memory, machine, progress, laws, y, active):
-    """The laws of the stage correct all twins; the filters of the others go on."""
+def set_all(cars, theta):
+    """Gives every twin the parameters (np,), and three of them their offset."""
+    for i in range(cars.size):
+        p = theta.copy()
+        if i > 0:
+            p[CM_X + i - 1] += OFFSET
+        set_parameters(cars[i], p)
+
+
+@njit(cache=True, nogil=True)
+def _single_laws(cars, setup, memory, laws, y, out, active):
+    """The laws of the stage correct the twins; the filters of the others go on."""
     changed = False
     for k in range(laws.size):
-        mine = active and STAGE_OF[laws[k].parameter] == progress.stage[0]
-        d = advance_law(laws[k], progress.laws[k], y, memory.out[0], setup.dt, mine)
+        i = laws[k].parameter
+        mine = active and STAGE_OF[i] == memory.stage[0]
+        d = advance_law(laws[k], memory.laws[k], y, out, setup.dt, mine)
         if d != 0.0:
-            memory.theta[laws[k].parameter] += d
+            p = memory.theta.copy()
+            p[i] += d
+            set_parameters(cars[0], p)
+            memory.theta[i] = p[i]  # what a body can have
             changed = True
-    if not changed:
-        return
-    memory.p[:] = memory.theta
-    set_parameters(cars[0], memory.p)
-    memory.theta[:] = memory.p  # what a body can have
-    for i in range(setup.index.size):
-        memory.p[:] = memory.theta
-        memory.p[setup.index[i]] += setup.offset[i]
-        set_parameters(cars[i + 1], memory.p)
+    if changed:
+        set_all(cars, memory.theta)
 
 
 @njit(cache=True, nogil=True)
-def _low_pass(setup, memory, machine, progress):
+def _low_pass(setup, memory, block):
     """A block of the twins' and the measured outputs through both low passes."""
-    n = memory.total.shape[0]
-    share = setup.block * setup.dt / (machine.quasi_static + setup.block * setup.dt)
+    time = setup.block * setup.dt
+    share = time / (setup.quasi_static + time)
+    n = block.mean.shape[0]
     for i in range(n + 1):
         for j in range(NY):
-            if i < n:
-                value = memory.total[i, j] / setup.block
-            elif memory.count[j] > 0.0:
-                value = memory.measured[j] / memory.count[j]
-            else:
-                value = progress.slow[0, n, j]
-            if memory.clock[BLOCKS] == 1:
-                progress.slow[:, i, j] = value
-            progress.slow[0, i, j] += share * (value - progress.slow[0, i, j])
-            progress.slow[1, i, j] += share * (progress.slow[0, i, j] - progress.slow[1, i, j])
+            value = block.mean[i, j] if i < n else block.measured[j]
+            if np.isnan(value):
+                continue
+            if memory.begun[0] == 0:
+                memory.slow[:, i, j] = value
+            memory.slow[0, i, j] += share * (value - memory.slow[0, i, j])
+            memory.slow[1, i, j] += share * (memory.slow[0, i, j] - memory.slow[1, i, j])
+    memory.begun[0] = 1
 
 
 @njit(cache=True, nogil=True)
-def _find_cm(cars, setup, memory, progress):
-    """A step of the fit of the CM to the low-passed outputs.
+def _find_cm(cars, setup, memory, block):
+    """A step of the fit of CM and biases to the low-passed outputs.
 
-    The filters are moved along with the twins, by their own sensitivities: else they would show the
+    States and filters of the twins move along, by their own sensitivities: else they would show the
     old CM for a while, and the fit would correct it twice.
     """
-    n, p = memory.total.shape[0], setup.index.size
-    memory.total[:] = progress.slow[1, :n] * setup.block
-    memory.measured[:] = progress.slow[1, n] * memory.count
-    before = memory.z.copy()
-    _estimate(cars, setup, memory)
-    for stage in range(2):
-        slow = progress.slow[stage]
-        change = np.zeros(NY)
-        for i in range(p):
-            change += (slow[i + 1] - slow[0]) * ((memory.z[i] - before[i]) / setup.offset[i])
-        for i in range(n):
-            slow[i] += change
-
-
-@njit(cache=True, nogil=True)
-def _update(cars, setup, memory, machine, progress, laws, u, y):
-    """One sample of inputs (nu,) and measurements (ny,)."""
-    for i in range(cars.size):
-        step(cars[i], u, memory.out[i])
-    memory.total[:] += memory.out
+    slow, n = memory.slow[1], cars.size
+    h, r, variance = np.zeros((NY, 3 + IMU)), np.zeros(NY), np.full(NY, ABSENT)
     for j in range(NY):
-        if not np.isnan(y[j]):
-            memory.measured[j] += y[j]
-            memory.count[j] += 1.0
-    active = _advance(machine, progress, y, setup.dt)
-    _single_laws(cars, setup, memory, machine, progress, laws, y, active)
-    memory.clock[SAMPLES] += 1
-    if memory.clock[SAMPLES] < setup.block:
-        return
-    memory.clock[SAMPLES] = 0
-    memory.clock[BLOCKS] += 1
-    _low_pass(setup, memory, machine, progress)
-    _follow_speed(cars, setup, memory)
-    if active and progress.stage[0] == CM:
-        _find_cm(cars, setup, memory, progress)
-    memory.total[:] = 0.0
-    memory.measured[:] = 0.0
-    memory.count[:] = 0.0
+        for i in range(3):
+            h[j, i] = (slow[i + 1, j] - slow[0, j]) / OFFSET
+        if j < IMU:
+            h[j, 3 + j] = 1.0
+        if block.count[j] > 0.0 and not np.isnan(setup.noise[j]):
+            r[j] = slow[n, j] - slow[0, j] - (memory.z[3 + j] if j < IMU else 0.0)
+            variance[j] = setup.noise[j] / block.count[j]
+    before = memory.z[:3].copy()
+    kalman_step(memory.z, memory.covariance, h, r, variance, setup.step_limit)
+    d = (memory.z[:3] - before) / OFFSET
+    memory.theta[CM_X : CM_X + 3] = memory.z[:3]
+    for filtered in memory.slow:
+        change = d @ (filtered[1:n] - filtered[0])
+        for i in range(n):
+            filtered[i] += change
+    states = np.empty((n, NX))
+    for i in range(n):
+        read_states(cars[i], states[i])
+    change = d @ (states[1:] - states[0])
+    for i in range(n):
+        move_states(cars[i], change.copy(), states[0, ROLL])
+    set_all(cars, memory.theta)
 
 
 @njit(cache=True, nogil=True)
-def run(cars, setup, memory, machine, progress, laws, inputs, measurements, log):
+def run(cars, setup, memory, block, laws, inputs, measurements, log):
     """All samples of a drive; returns how many were sound."""
     for k in range(inputs.shape[0]):
         read_states(cars[0], log.states[k])
-        _update(cars, setup, memory, machine, progress, laws, inputs[k], measurements[k])
+        y = measurements[k]
+        full = advance(cars, block, setup.block, inputs[k], y)
+        active = _advance(setup, memory, y)
+        _single_laws(cars, setup, memory, laws, y, block.out[0], active)
+        if full:
+            _low_pass(setup, memory, block)
+            follow_speed(cars, block, setup.speed_gain * setup.block * setup.dt)
+            if active and memory.stage[0] == CM:
+                _find_cm(cars, setup, memory, block)
         log.parameters[k] = memory.theta
-        log.outputs[k] = memory.out[0]
+        log.outputs[k] = block.out[0]
         log.extended[k] = cars[0].tyre_output
-        log.stage[k] = progress.stage[0]
-        log.sd[k, : laws.size] = np.sqrt(progress.laws[:, 0])
-        for i in range(setup.index.size):
+        log.stage[k] = memory.stage[0]
+        log.sd[k, : laws.size] = np.sqrt(memory.laws[:, 0])
+        for i in range(3):
             log.sd[k, laws.size + i] = np.sqrt(memory.covariance[i, i])
         for i in range(cars.size):
             if not is_sound(cars[i]):

@@ -3,57 +3,90 @@
 Twin 0 stands at the estimate, twins i and p + i at plus and minus the i-th column of the root of
 the parameters' covariance. The regression of their outputs and states on their parameters gives
 what the joint observer takes from fixed differences, its H and S, over as wide a range as the
-estimate is uncertain by; their mean, less twin 0, the bend of the outputs over this range. After
-each step of the estimate the twins move to its new sigma points, states along with S.
+estimate is uncertain by; what their mean differs by from twin 0 is the bend of the outputs over
+this range. After each step of the estimate the twins move to its new sigma points, states along
+with S.
 
 The biases of the sensors enter linearly and need no sigma points.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from estimators.joint_kernel import (
-    ANGLE,
-    BLOCKS,
-    NY,
-    PITCH,
-    ROLL,
-    SAMPLES,
-    _follow_speed,
-    _innovation,
-    _is_excited,
-)
 from estimators.rigid_body import project
-from twin.kernel import correct, is_sound, read_states, set_parameters, step
+from estimators.side_by_side import (
+    ABSENT,
+    NY,
+    ROLL,
+    advance,
+    follow_speed,
+    kalman_step,
+    move_states,
+)
+from twin import OUTPUTS
+from twin.kernel import is_sound, read_states, set_parameters
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 # Where the sigma points stand, in standard deviations; chosen: the usual root of 3 would be further
 # than most loads, and a third of the inertia of a car is as far as its body allows
 SPREAD = 1.0
+AX, AY, ROLL_RATE, PITCH_RATE = (OUTPUTS.index(n) for n in ("ax", "ay", "roll_rate", "pitch_rate"))
+# Of the motion that tells something: weight of its channels and the seconds it is looked back on
+EXCITING = ((AX, 1.0), (AY, 1.0), (ROLL_RATE, 900.0), (PITCH_RATE, 900.0))
+EXCITED_FOR = 1.0
+BLOCKS = 0  # what the clock counts
+
+
+class Setup(NamedTuple):
+    """What does not change: p parameters, q estimates (parameters, then biases of channels)."""
+
+    index: Indices  # (p,) of each parameter among the twin's
+    step_limit: Array  # (q,) the most an estimate may move in a block
+    drift: Array  # (q,) variance per second
+    noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
+    nominal: Array  # (np,) the unloaded chassis
+    block: int  # samples
+    hold_off: int  # blocks before the first correction
+    speed_gain: float  # of the twins' speeds [1/s]
+    least_excitation: float  # [m2/s4]
+    dt: float  # of a sample [s]
+
+
+class Memory(NamedTuple):
+    """What the filter keeps from sample to sample, beside its twins."""
+
+    theta: Array  # (np,) parameters of twin 0
+    z: Array  # (q,) estimates
+    covariance: Array  # (q, q)
+    root: Array  # (p, p) of the parameters' covariance, times SPREAD
+    white: Array  # (2p, p) of each sigma point, the distance from twin 0 in units of the root
+    states: Array  # (n, nx)
+    excitation: Array  # (2, 4) means and squares of what excites
+    clock: Indices  # (1,)
 
 
 @njit(cache=True, nogil=True)
-def place(cars, setup, memory, root, white):
-    """Sets the parameters of all twins: estimate and sigma points.
+def place(cars, setup, memory):
+    """Gives all twins the parameters of estimate and sigma points, as far as a body can have them.
 
-    Args:
-        cars: (2p + 1,).
-        setup, memory: of the joint observer.
-        root: (p, p) filled with the root of the covariance, times `SPREAD`.
-        white: (2p, p) filled with each twin's distance from the estimate in units of the root, as
-            far as a body can have it.
+    Fills memory.root and memory.white.
     """
-    p = setup.index.size
+    p, root = setup.index.size, memory.root
     root[:] = SPREAD * np.linalg.cholesky(np.ascontiguousarray(memory.covariance[:p, :p]))
-    memory.p[:] = memory.theta
-    set_parameters(cars[0], memory.p)
-    centre = memory.p[setup.index]
+    wanted = memory.theta.copy()
+    set_parameters(cars[0], wanted)
+    centre = wanted[setup.index]
     for i in range(2 * p):
-        sign = 1.0 if i < p else -1.0
-        memory.p[:] = memory.theta
+        wanted[:] = memory.theta
         for k in range(p):
-            memory.p[setup.index[k]] += sign * root[k, i % p]
-        set_parameters(cars[i + 1], memory.p)
-        white[i] = np.linalg.solve(root, memory.p[setup.index] - centre)
+            wanted[setup.index[k]] += root[k, i % p] * (1.0 if i < p else -1.0)
+        set_parameters(cars[i + 1], wanted)
+        memory.white[i] = np.linalg.solve(root, wanted[setup.index] - centre)
 
 
 @njit(cache=True, nogil=True)
@@ -64,118 +97,100 @@ def _regression(white, values):
 
 
 @njit(cache=True, nogil=True)
-def update(cars, setup, memory, root, white, u, y):
-    """One sample of inputs (nu,) and measurements (ny,)."""
-    for i in range(cars.size):
-        step(cars[i], u, memory.out[i])
-    memory.total[:] += memory.out
+def _outputs(setup, memory, block):
+    """Derivatives h (ny, q), innovations (ny,), and the variance of their noise (ny,)."""
+    p, q = setup.index.size, memory.z.size
+    slopes = _regression(memory.white, block.mean)
+    h, r, variance = np.zeros((NY, q)), np.zeros(NY), np.full(NY, ABSENT)
+    h[:, :p] = np.linalg.solve(memory.root.T, slopes).T
+    for i in range(p, q):
+        h[i - p, i] = 1.0
     for j in range(NY):
-        if not np.isnan(y[j]):
-            memory.measured[j] += y[j]
-            memory.count[j] += 1.0
-    memory.clock[SAMPLES] += 1
-    if memory.clock[SAMPLES] < setup.block:
-        return
-    memory.clock[SAMPLES] = 0
-    memory.clock[BLOCKS] += 1
-    _estimate(cars, setup, memory, root, white)
-    _follow_speed(cars, setup, memory)
-    memory.total[:] = 0.0
-    memory.measured[:] = 0.0
-    memory.count[:] = 0.0
+        if block.count[j] > 0.0 and not np.isnan(setup.noise[j]):
+            bend = 0.0  # second order: half the trace of covariance times curvature
+            for i in range(2 * p):
+                line = memory.white[i] @ np.ascontiguousarray(slopes[:, j])
+                bend += block.mean[i + 1, j] - block.mean[0, j] - line
+            r[j] = block.measured[j] - block.mean[0, j] - bend / (2.0 * SPREAD**2)
+            if j < q - p:
+                r[j] -= memory.z[p + j]
+            variance[j] = setup.noise[j] / block.count[j]
+    return h, r, variance
 
 
 @njit(cache=True, nogil=True)
-def _estimate(cars, setup, memory, root, white):
+def _is_excited(setup, memory, y):
+    """Whether the twin's own motion varies enough to tell anything."""
+    share = setup.block * setup.dt / EXCITED_FOR
+    mean, square = memory.excitation[0], memory.excitation[1]
+    total = 0.0
+    for k, (channel, weight) in enumerate(EXCITING):
+        if memory.clock[BLOCKS] == 1:
+            mean[k], square[k] = y[channel], y[channel] ** 2
+        mean[k] += share * (y[channel] - mean[k])
+        square[k] += share * (y[channel] ** 2 - square[k])
+        total += weight * (square[k] - mean[k] ** 2)
+    return total >= setup.least_excitation
+
+
+@njit(cache=True, nogil=True)
+def _estimate(cars, setup, memory, block):
     """A Kalman step on the parameters, and all twins to their new sigma points."""
-    p, q = setup.index.size, memory.z.size
-    means = memory.total / setup.block
-    slopes = _regression(white, means)
-    h = np.zeros((NY, q))
-    h[:, :p] = np.linalg.solve(root.T, slopes).T
-    for i in range(p, q):
-        h[setup.bias_output[i - p], i] = 1.0
-    r, variance = _innovation(setup, memory, h)
-    # second order: half the trace of covariance times curvature, from what is left of the line
-    for i in range(2 * p):
-        bend = means[i + 1] - means[0] - white[i] @ slopes
-        r -= bend / (2.0 * SPREAD**2)
-    excited = _is_excited(setup, memory)
+    memory.clock[BLOCKS] += 1
+    excited = _is_excited(setup, memory, block.mean[0])
     if excited and memory.clock[BLOCKS] > setup.hold_off:
         before = memory.z.copy()
-        _kalman_step(setup, memory, h, r, variance)
+        h, r, variance = _outputs(setup, memory, block)
+        kalman_step(memory.z, memory.covariance, h, r, variance, setup.step_limit)
         project(memory.z, memory.covariance, setup.index, setup.nominal, memory.theta)
-        for i in range(p):
+        for i in range(setup.index.size):
             memory.theta[setup.index[i]] = memory.z[i]
-        _move(cars, setup, memory, root, white, memory.z[:p] - before[:p])
-    for i in range(q):
+        _move(cars, setup, memory, memory.z - before)
+    for i in range(memory.z.size):
         memory.covariance[i, i] += setup.drift[i] * setup.block * setup.dt
 
 
 @njit(cache=True, nogil=True)
-def _kalman_step(setup, memory, h, r, variance):
-    """The estimates z and their covariance, with the joint observer's limit of a step."""
-    q, covariance = memory.z.size, memory.covariance
-    hp = h @ covariance
-    s = hp @ h.T + np.diag(variance)
-    gain = np.ascontiguousarray(np.linalg.solve(s, hp).T)
-    move = gain @ r
-    share = 1.0
-    for i in range(q):
-        if share * abs(move[i]) > setup.step_limit[i]:
-            share = setup.step_limit[i] / abs(move[i])
-    gain *= share
-    rest = np.eye(q) - gain @ h
-    covariance[:] = rest @ covariance @ rest.T + (gain * variance) @ gain.T
-    memory.information[:] += h.T @ (h / variance.reshape(-1, 1))
-    memory.z[:] += share * move
-
-
-@njit(cache=True, nogil=True)
-def _move(cars, setup, memory, root, white, d):
-    """Moves all twins to the sigma points of the new estimate, d (p,) from the one before."""
-    p = setup.index.size
+def _move(cars, setup, memory, d):
+    """Moves all twins to the sigma points of the new estimate, d (q,) from the one before."""
     for i in range(cars.size):
         read_states(cars[i], memory.states[i])
-    slopes = _regression(white, memory.states)
-    old_root, old_white = root.copy(), white.copy()
-    place(cars, setup, memory, root, white)
+    slopes = _regression(memory.white, memory.states)
+    root, white = memory.root.copy(), memory.white.copy()
+    place(cars, setup, memory)
     for i in range(cars.size):
-        change = d.copy()
+        change = d[: setup.index.size].copy()
         if i > 0:
-            change += root @ white[i - 1] - old_root @ old_white[i - 1]
-        memory.dx[:] = np.linalg.solve(old_root, change) @ slopes
-        _without_heading(memory.dx, memory.states[0, ROLL])
-        correct(cars[i], memory.dx)
-    # the parameters in force are those that a body can have
-    for k in range(p):
-        memory.theta[setup.index[k]] = memory.z[k]
+            change += memory.root @ memory.white[i - 1] - root @ white[i - 1]
+        dx = np.linalg.solve(root, change) @ slopes
+        move_states(cars[i], dx, memory.states[0, ROLL])
 
 
 @njit(cache=True, nogil=True)
-def _without_heading(dx, roll):
-    """A change of the states that leaves position, heading and wheel angles alone."""
-    dx[0:2] = 0.0
-    pitch = dx[PITCH]
-    dx[PITCH], dx[PITCH + 1] = np.cos(roll) * pitch, -np.sin(roll) * pitch
-    dx[ANGLE : ANGLE + 4] = 0.0
-
-
-@njit(cache=True, nogil=True)
-def run(cars, setup, memory, root, white, inputs, measurements, log):
+def run(cars, setup, memory, block, inputs, measurements, log):
     """All samples of a drive; returns how many were sound."""
     p = setup.index.size
     for k in range(inputs.shape[0]):
         read_states(cars[0], log.states[k])
-        update(cars, setup, memory, root, white, inputs[k], measurements[k])
+        if advance(cars, block, setup.block, inputs[k], measurements[k]):
+            _estimate(cars, setup, memory, block)
+            follow_speed(cars, block, setup.speed_gain * setup.block * setup.dt)
         log.parameters[k] = memory.theta
-        log.outputs[k] = memory.out[0]
+        log.outputs[k] = block.out[0]
         log.extended[k] = cars[0].tyre_output
-        log.sd[k] = np.sqrt(np.diag(memory.covariance))
-        log.biases[k] = memory.z[p:]
+        for i in range(p):
+            log.sd[k, i] = np.sqrt(memory.covariance[i, i])
         for i in range(cars.size):
             if not is_sound(cars[i]):
                 return k
     return inputs.shape[0]
 
 
+class Log(NamedTuple):
+    """Histories of N samples, to be filled."""
+
+    states: Array  # (N, nx)
+    parameters: Array  # (N, np)
+    outputs: Array  # (N, ny)
+    extended: Array  # (N, 4, 9)
+    sd: Array  # (N, p)

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from numpy.typing import ArrayLike
 
 from estimators.estimate import Estimate
-from estimators.joint import JointSettings
 from estimators.law import ParameterLaw
 from estimators.observer import Observer
 from estimators.offline_fit import offline_fit
@@ -36,7 +35,7 @@ def _paper(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) ->
 
 
 def _unscented(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return unscented(vehicle, drive, noise_sd, JointSettings(parameters=PARAMETERS), speed=speed)
+    return unscented(vehicle, drive, noise_sd, PARAMETERS, speed=speed)
 
 
 def _least_squares(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
