@@ -74,7 +74,8 @@ def unscented(
     )
     memory = Memory(
         theta=np.zeros(len(PARAMETERS)), z=np.zeros(prior.size), covariance=np.diag(prior**2),
-        root=np.zeros((p, p)), white=np.zeros((2 * p, p)), states=np.zeros((2 * p + 1, len(STATES))),
+        root=np.zeros((p, p)), white=np.zeros((2 * p, p)),
+        states=np.zeros((2 * p + 1, len(STATES))),
         excitation=np.zeros((2, 4)), clock=np.zeros(1, dtype=np.int64),
     )  # fmt: skip
     unscented_kernel.place(fleet.cars, setup, memory)
