@@ -68,48 +68,18 @@ def offline_fit(
         )
     prior = PRIOR_SD | dict(prior_sd or {})
     scale = np.array([*(prior[name] for name in parameters), *BIAS_SD])
-    offset = np.array([OFFSETS[name] for name in parameters])
     measured = _measured(drive, np.asarray(noise_sd, dtype=np.float64))
-    observer, p = Observer(Twin(vehicle), []), len(parameters)
-    last: dict[bytes, Estimate] = {}
-
-    def simulate(theta: Array) -> Estimate:
-        observer.reset(speed, dict(zip(parameters, theta.tolist(), strict=True)))
-        return observer.run(drive)
-
-    def run(theta: Array) -> Estimate:
-        if theta.tobytes() not in last:
-            last.clear()
-            last[theta.tobytes()] = simulate(theta)
-        return last[theta.tobytes()]
-
-    def residuals(x: Array) -> Array:
-        z = x * scale
-        found = _block_means(run(z[:p]).outputs)
-        found[:, : z.size - p] += z[p:]
-        return np.append(((found - measured.mean) * measured.weight).ravel(), x)
-
-    def jacobian(x: Array) -> Array:
-        theta = x[:p] * scale[:p]
-        middle = _block_means(run(theta).outputs)
-        columns = [
-            (_block_means(simulate(theta + h * step).outputs) - middle) / h
-            for h, step in zip(offset, np.eye(p), strict=True)
-        ]
-        columns += [
-            np.broadcast_to(row, middle.shape) for row in np.eye(len(OUTPUTS))[: x.size - p]
-        ]
-        stacked = [(c * measured.weight * s).ravel() for c, s in zip(columns, scale, strict=True)]
-        return np.vstack([np.column_stack(stacked), np.eye(x.size)])
-
+    problem = _Problem(vehicle, drive, measured, tuple(parameters), speed, scale)
     solution = least_squares(
-        residuals, np.zeros(scale.size), jac=jacobian, ftol=TOLERANCE, max_nfev=MOST_STEPS
+        problem.residuals,
+        np.zeros(scale.size),
+        jac=problem.jacobian,  # pyright: ignore[reportArgumentType] # SciPy comes without types
+        ftol=TOLERANCE,
+        max_nfev=MOST_STEPS,
     )
-    slopes = solution.jac[: -scale.size] / scale
-    information = slopes.T @ slopes
-    covariance = np.linalg.inv(np.eye(scale.size) + information * np.outer(scale, scale))
-    covariance *= np.outer(scale, scale)
-    estimate = run(solution.x[:p] * scale[:p])
+    # in units of the prior, of which the last rows of the Jacobian are
+    covariance = np.linalg.inv(solution.jac.T @ solution.jac) * np.outer(scale, scale)
+    estimate, p = problem.run(solution.x), len(parameters)
     return ParameterEstimate(
         time=estimate.time,
         states=estimate.states,
@@ -127,6 +97,61 @@ class _Measured(NamedTuple):
 
     mean: Array
     weight: Array
+
+
+class _Problem:
+    """Residuals and their slopes over x (q,): parameters and biases in units of their prior."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        drive: Drive,
+        measured: _Measured,
+        parameters: tuple[str, ...],
+        speed: float,
+        scale: Array,
+    ) -> None:
+        self._twin = Twin(vehicle)
+        self._observer, self._drive, self._measured = Observer(self._twin, []), drive, measured
+        self._parameters, self._speed, self._scale = parameters, speed, scale
+        self._last: tuple[Array, Estimate] | None = None
+
+    def _simulate(self, theta: Array) -> Estimate:
+        """The open-loop twin over the drive, with parameters theta (p,)."""
+        load = dict(zip(self._parameters, theta.tolist(), strict=True))
+        self._observer.reset(self._speed, load)
+        self._twin.reset(self._speed, self._drive.inputs[0, 9:13])
+        return self._observer.run(self._drive)
+
+    def _theta(self, x: Array) -> Array:
+        return (x * self._scale)[: len(self._parameters)]
+
+    def run(self, x: Array) -> Estimate:
+        """The twin's run at x; the last one is kept."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            self._last = x.copy(), self._simulate(self._theta(x))
+        return self._last[1]
+
+    def residuals(self, x: Array) -> Array:
+        """(m + q,) of the m outputs, and of the prior."""
+        biases = (x * self._scale)[len(self._parameters) :]
+        found = _block_means(self.run(x).outputs)
+        found[:, : biases.size] += biases
+        return np.append(((found - self._measured.mean) * self._measured.weight).ravel(), x)
+
+    def jacobian(self, x: Array) -> Array:
+        """(m + q, q), by one run for each parameter."""
+        theta, middle = self._theta(x), _block_means(self.run(x).outputs)
+        columns = []
+        for i, name in enumerate(self._parameters):
+            beside = theta.copy()
+            beside[i] += OFFSETS[name]
+            columns.append((_block_means(self._simulate(beside).outputs) - middle) / OFFSETS[name])
+        biased = np.eye(len(OUTPUTS))[: x.size - theta.size]
+        columns += [np.broadcast_to(row, middle.shape) for row in biased]
+        pairs = zip(columns, self._scale, strict=True)
+        stacked = [(column * self._measured.weight * s).ravel() for column, s in pairs]
+        return np.vstack([np.column_stack(stacked), np.eye(x.size)])
 
 
 def _measured(drive: Drive, sd: Array) -> _Measured:

@@ -30,14 +30,14 @@ class Block(NamedTuple):
     out: Array  # (n, ny) the twins' last outputs
     mean: Array  # (n, ny) of their outputs; a sum until the block is full
     measured: Array  # (ny,) mean of the measurements, NaN: none; a sum until the block is full
-    count: Array  # (ny,) of measurements
+    number: Array  # (ny,) of measurements
     samples: Indices  # (1,) in the block
 
 
 def new_block(n: int) -> Block:
     """An empty block of n twins."""
     return Block(
-        out=np.zeros((n, NY)), mean=np.zeros((n, NY)), measured=np.zeros(NY), count=np.zeros(NY),
+        out=np.zeros((n, NY)), mean=np.zeros((n, NY)), measured=np.zeros(NY), number=np.zeros(NY),
         samples=np.zeros(1, dtype=np.int64),
     )  # fmt: skip
 
@@ -49,7 +49,7 @@ def advance(cars, block, size, u, y):
         block.samples[0] = 0
         block.mean[:] = 0.0
         block.measured[:] = 0.0
-        block.count[:] = 0.0
+        block.number[:] = 0.0
     for i in range(cars.size):
         step(cars[i], u, block.out[i])
         for j in range(NY):
@@ -57,13 +57,13 @@ def advance(cars, block, size, u, y):
     for j in range(NY):
         if not np.isnan(y[j]):
             block.measured[j] += y[j]
-            block.count[j] += 1.0
+            block.number[j] += 1.0
     block.samples[0] += 1
     if block.samples[0] < size:
         return False
     for j in range(NY):
         block.mean[:, j] /= size
-        block.measured[j] = block.measured[j] / block.count[j] if block.count[j] else np.nan
+        block.measured[j] = block.measured[j] / block.number[j] if block.number[j] else np.nan
     return True
 
 
@@ -119,7 +119,7 @@ def follow_speed(cars, block, share):
     for i in range(cars.size):
         late, spin, n = 0.0, 0.0, 0
         for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
-            if block.count[j] > 0.0:
+            if block.number[j] > 0.0:
                 late += block.measured[j] - block.mean[i, j]
                 spin += block.mean[i, j]
                 n += 1

@@ -37,6 +37,10 @@ Array = NDArray[np.float64]
 
 CM = ("cm_x", "cm_y", "cm_z")
 QUASI_STATIC = ("ax", "ay", "roll_rate", "pitch_rate", "yaw_rate")
+PRIOR = np.array([*(PRIOR_SD[name] for name in CM), *BIAS_SD])
+# Of the yaw rate's low pass [s]; chosen: passes a driver's steering, leaves a tenth of the noise
+YAW_FILTER = 0.1
+LEAST_WHEEL_SPEED = 3.0  # rad/s, 1 m/s, as in the mass law
 
 
 class Stage(IntEnum):
@@ -112,46 +116,18 @@ def staged(
     if sorted(named) != ["Jxx", "Jyy", "Jzz", "mass"]:
         raise TwinError(f"staged: laws are of {', '.join(named)}; allowed: mass, Jxx, Jyy, Jzz")
     check_inputs(drive.inputs, "drive")
-    fleet, road = Fleet(vehicle, 1 + len(CM)), drive.inputs[0, 9:13]
-    twin = fleet.twins[0]
-    theta = np.zeros(len(PARAMETERS))
-    staged_kernel.set_all(fleet.cars, theta)
-    for each in fleet.twins:
-        each.reset(speed, road)
-    table, law_memory = compile_laws(laws, twin.dt)
-    prior = np.array([*(PRIOR_SD[name] for name in CM), *BIAS_SD])
-    setup = Setup(
-        seconds=np.array(
-            [settings.mass_seconds, settings.pitch_seconds, settings.cm_seconds, np.inf]
-        ),
-        straight=settings.straight,
-        yaw_filter=0.1,  # s, chosen: passes a driver's steering, leaves a tenth of the noise
-        loaded=settings.loaded,
-        quasi_static=1.0 / (2.0 * np.pi * settings.corner),
-        least_wheel_speed=3.0,  # rad/s, 1 m/s, as in the mass law
-        noise=np.where(np.isin(OUTPUTS, QUASI_STATIC), noise_sd, np.nan) ** 2,
-        step_limit=STEP * prior,
-        block=BLOCK,
-        speed_gain=SPEED_GAIN,
-        dt=twin.dt,
-    )
-    memory = Memory(
-        stage=np.zeros(1, dtype=np.int64),
-        clock=np.zeros(4),
-        yaw_rate=np.zeros(1),
-        theta=theta,
-        laws=law_memory,
-        z=np.zeros(prior.size),
-        covariance=np.diag(prior**2),
-        slow=np.zeros((2, len(fleet) + 1, len(OUTPUTS))),
-        begun=np.zeros(1, dtype=np.int64),
-    )
-    n = len(drive)
+    fleet, n = Fleet(vehicle, 1 + len(CM)), len(drive)
+    setup = _setup(settings, np.asarray(noise_sd, dtype=np.float64), fleet.twins[0].dt)
+    table, law_memory = compile_laws(laws, setup.dt)
+    memory = _memory(law_memory)
+    staged_kernel.set_all(fleet.cars, memory.theta)
+    for twin in fleet.twins:
+        twin.reset(speed, drive.inputs[0, 9:13])
     log = Log(
         states=np.empty((n, len(STATES))),
         parameters=np.empty((n, len(PARAMETERS))),
         outputs=np.empty((n, len(OUTPUTS))),
-        extended=np.empty((n, *twin.car.tyre_output.shape)),
+        extended=np.empty((n, *fleet.cars[0].tyre_output.shape)),
         stage=np.empty(n, dtype=np.int64),
         sd=np.empty((n, len(laws) + len(CM))),
     )
@@ -167,8 +143,40 @@ def staged(
         parameters=log.parameters,
         outputs=log.outputs,
         extended=log.extended.reshape(n, -1),
-        nominal=twin.car.nominal.copy(),
+        nominal=fleet.cars[0].nominal.copy(),
         stage=log.stage,
         estimated=(*named, *CM),
         sd=log.sd,
+    )
+
+
+def _setup(settings: StagedSettings, noise_sd: Array, dt: float) -> Setup:
+    return Setup(
+        seconds=np.array(
+            [settings.mass_seconds, settings.pitch_seconds, settings.cm_seconds, np.inf]
+        ),
+        straight=settings.straight,
+        yaw_filter=YAW_FILTER,
+        loaded=settings.loaded,
+        quasi_static=1.0 / (2.0 * np.pi * settings.corner),
+        least_wheel_speed=LEAST_WHEEL_SPEED,
+        noise=np.where(np.isin(OUTPUTS, QUASI_STATIC), noise_sd, np.nan) ** 2,
+        step_limit=STEP * PRIOR,
+        block=BLOCK,
+        speed_gain=SPEED_GAIN,
+        dt=dt,
+    )
+
+
+def _memory(laws: Array) -> Memory:
+    return Memory(
+        stage=np.zeros(1, dtype=np.int64),
+        clock=np.zeros(len(Stage)),
+        yaw_rate=np.zeros(1),
+        theta=np.zeros(len(PARAMETERS)),
+        laws=laws,
+        z=np.zeros(PRIOR.size),
+        covariance=np.diag(PRIOR**2),
+        slow=np.zeros((2, 2 + len(CM), len(OUTPUTS))),
+        begun=np.zeros(1, dtype=np.int64),
     )

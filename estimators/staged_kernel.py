@@ -159,9 +159,9 @@ def _find_cm(cars, setup, memory, block):
             h[j, i] = (slow[i + 1, j] - slow[0, j]) / OFFSET
         if j < IMU:
             h[j, 3 + j] = 1.0
-        if block.count[j] > 0.0 and not np.isnan(setup.noise[j]):
+        if block.number[j] > 0.0 and not np.isnan(setup.noise[j]):
             r[j] = slow[n, j] - slow[0, j] - (memory.z[3 + j] if j < IMU else 0.0)
-            variance[j] = setup.noise[j] / block.count[j]
+            variance[j] = setup.noise[j] / block.number[j]
     before = memory.z[:3].copy()
     kalman_step(memory.z, memory.covariance, h, r, variance, setup.step_limit)
     d = (memory.z[:3] - before) / OFFSET

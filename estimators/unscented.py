@@ -8,7 +8,7 @@ IMU along.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from estimators import unscented_kernel
 from estimators.joint import PRIOR_SD
@@ -16,6 +16,8 @@ from estimators.parameter_estimate import ParameterEstimate
 from estimators.side_by_side import new_block
 from estimators.unscented_kernel import Log, Memory, Setup
 from twin import OUTPUTS, PARAMETERS, STATES, Drive, Fleet, TwinError, Vehicle, check_inputs
+
+Array = NDArray[np.float64]
 
 # Of a cheap IMU [m/s2, rad/s]
 BIAS_SD = (0.1, 0.1, 0.1, 0.005, 0.005, 0.005)
@@ -56,37 +58,19 @@ def unscented(
             f"{', '.join(PARAMETERS)}"
         )
     check_inputs(drive.inputs, "drive")
-    p, n = len(parameters), len(drive)
-    fleet = Fleet(vehicle, 2 * p + 1)
-    twin = fleet.twins[0]
-    prior = np.array([*(PRIOR_SD[name] for name in parameters), *BIAS_SD])
-    setup = Setup(
-        index=np.array([PARAMETERS.index(name) for name in parameters], dtype=np.int64),
-        step_limit=STEP * prior,
-        drift=(DRIFT * prior) ** 2,
-        noise=NOISE_FACTOR * np.asarray(noise_sd, dtype=np.float64) ** 2,
-        nominal=twin.car.nominal.copy(),
-        block=BLOCK,
-        hold_off=round(HOLD_OFF / (BLOCK * twin.dt)),
-        speed_gain=SPEED_GAIN,
-        least_excitation=LEAST_EXCITATION,
-        dt=twin.dt,
-    )
-    memory = Memory(
-        theta=np.zeros(len(PARAMETERS)), z=np.zeros(prior.size), covariance=np.diag(prior**2),
-        root=np.zeros((p, p)), white=np.zeros((2 * p, p)),
-        states=np.zeros((2 * p + 1, len(STATES))),
-        excitation=np.zeros((2, 4)), clock=np.zeros(1, dtype=np.int64),
-    )  # fmt: skip
+    fleet = Fleet(vehicle, 2 * len(parameters) + 1)
+    setup = _setup(fleet, parameters, np.asarray(noise_sd, dtype=np.float64))
+    memory = _memory(setup)
     unscented_kernel.place(fleet.cars, setup, memory)
-    for each in fleet.twins:
-        each.reset(speed, drive.inputs[0, 9:13])
+    for twin in fleet.twins:
+        twin.reset(speed, drive.inputs[0, 9:13])
+    n = len(drive)
     log = Log(
         states=np.empty((n, len(STATES))),
         parameters=np.empty((n, len(PARAMETERS))),
         outputs=np.empty((n, len(OUTPUTS))),
-        extended=np.empty((n, *twin.car.tyre_output.shape)),
-        sd=np.empty((n, p)),
+        extended=np.empty((n, *fleet.cars[0].tyre_output.shape)),
+        sd=np.empty((n, len(parameters))),
     )
     done = unscented_kernel.run(
         fleet.cars, setup, memory, new_block(len(fleet)), drive.inputs, drive.measurements, log
@@ -99,7 +83,39 @@ def unscented(
         parameters=log.parameters,
         outputs=log.outputs,
         extended=log.extended.reshape(n, -1),
-        nominal=setup.nominal.copy(),
+        nominal=setup.nominal,
         estimated=tuple(parameters),
         sd=log.sd,
+    )
+
+
+def _setup(fleet: Fleet, parameters: Sequence[str], noise_sd: Array) -> Setup:
+    prior = np.array([*(PRIOR_SD[name] for name in parameters), *BIAS_SD])
+    twin = fleet.twins[0]
+    return Setup(
+        column=np.array([PARAMETERS.index(name) for name in parameters], dtype=np.int64),
+        prior=prior,
+        step_limit=STEP * prior,
+        drift=(DRIFT * prior) ** 2,
+        noise=NOISE_FACTOR * noise_sd**2,
+        nominal=twin.car.nominal.copy(),
+        block=BLOCK,
+        hold_off=round(HOLD_OFF / (BLOCK * twin.dt)),
+        speed_gain=SPEED_GAIN,
+        least_excitation=LEAST_EXCITATION,
+        dt=twin.dt,
+    )
+
+
+def _memory(setup: Setup) -> Memory:
+    p, q = setup.column.size, setup.prior.size
+    return Memory(
+        theta=np.zeros(len(PARAMETERS)),
+        z=np.zeros(q),
+        covariance=np.diag(setup.prior**2),
+        root=np.zeros((p, p)),
+        white=np.zeros((2 * p, p)),
+        states=np.zeros((2 * p + 1, len(STATES))),
+        excitation=np.zeros((2, 4)),
+        clock=np.zeros(1, dtype=np.int64),
     )

@@ -45,7 +45,8 @@ BLOCKS = 0  # what the clock counts
 class Setup(NamedTuple):
     """What does not change: p parameters, q estimates (parameters, then biases of channels)."""
 
-    index: Indices  # (p,) of each parameter among the twin's
+    column: Indices  # (p,) of each parameter among the twin's
+    prior: Array  # (q,) standard deviation at the start
     step_limit: Array  # (q,) the most an estimate may move in a block
     drift: Array  # (q,) variance per second
     noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
@@ -76,17 +77,17 @@ def place(cars, setup, memory):
 
     Fills memory.root and memory.white.
     """
-    p, root = setup.index.size, memory.root
+    p, root = setup.column.size, memory.root
     root[:] = SPREAD * np.linalg.cholesky(np.ascontiguousarray(memory.covariance[:p, :p]))
     wanted = memory.theta.copy()
     set_parameters(cars[0], wanted)
-    centre = wanted[setup.index]
+    centre = wanted[setup.column]
     for i in range(2 * p):
         wanted[:] = memory.theta
         for k in range(p):
-            wanted[setup.index[k]] += root[k, i % p] * (1.0 if i < p else -1.0)
+            wanted[setup.column[k]] += root[k, i % p] * (1.0 if i < p else -1.0)
         set_parameters(cars[i + 1], wanted)
-        memory.white[i] = np.linalg.solve(root, wanted[setup.index] - centre)
+        memory.white[i] = np.linalg.solve(root, wanted[setup.column] - centre)
 
 
 @njit(cache=True, nogil=True)
@@ -99,14 +100,14 @@ def _regression(white, values):
 @njit(cache=True, nogil=True)
 def _outputs(setup, memory, block):
     """Derivatives h (ny, q), innovations (ny,), and the variance of their noise (ny,)."""
-    p, q = setup.index.size, memory.z.size
+    p, q = setup.column.size, memory.z.size
     slopes = _regression(memory.white, block.mean)
     h, r, variance = np.zeros((NY, q)), np.zeros(NY), np.full(NY, ABSENT)
     h[:, :p] = np.linalg.solve(memory.root.T, slopes).T
     for i in range(p, q):
         h[i - p, i] = 1.0
     for j in range(NY):
-        if block.count[j] > 0.0 and not np.isnan(setup.noise[j]):
+        if block.number[j] > 0.0 and not np.isnan(setup.noise[j]):
             bend = 0.0  # second order: half the trace of covariance times curvature
             for i in range(2 * p):
                 line = memory.white[i] @ np.ascontiguousarray(slopes[:, j])
@@ -114,7 +115,7 @@ def _outputs(setup, memory, block):
             r[j] = block.measured[j] - block.mean[0, j] - bend / (2.0 * SPREAD**2)
             if j < q - p:
                 r[j] -= memory.z[p + j]
-            variance[j] = setup.noise[j] / block.count[j]
+            variance[j] = setup.noise[j] / block.number[j]
     return h, r, variance
 
 
@@ -142,9 +143,9 @@ def _estimate(cars, setup, memory, block):
         before = memory.z.copy()
         h, r, variance = _outputs(setup, memory, block)
         kalman_step(memory.z, memory.covariance, h, r, variance, setup.step_limit)
-        project(memory.z, memory.covariance, setup.index, setup.nominal, memory.theta)
-        for i in range(setup.index.size):
-            memory.theta[setup.index[i]] = memory.z[i]
+        project(memory.z, memory.covariance, setup.column, setup.nominal, memory.theta)
+        for i in range(setup.column.size):
+            memory.theta[setup.column[i]] = memory.z[i]
         _move(cars, setup, memory, memory.z - before)
     for i in range(memory.z.size):
         memory.covariance[i, i] += setup.drift[i] * setup.block * setup.dt
@@ -159,7 +160,7 @@ def _move(cars, setup, memory, d):
     root, white = memory.root.copy(), memory.white.copy()
     place(cars, setup, memory)
     for i in range(cars.size):
-        change = d[: setup.index.size].copy()
+        change = d[: setup.column.size].copy()
         if i > 0:
             change += memory.root @ memory.white[i - 1] - root @ white[i - 1]
         dx = np.linalg.solve(root, change) @ slopes
@@ -169,7 +170,7 @@ def _move(cars, setup, memory, d):
 @njit(cache=True, nogil=True)
 def run(cars, setup, memory, block, inputs, measurements, log):
     """All samples of a drive; returns how many were sound."""
-    p = setup.index.size
+    p = setup.column.size
     for k in range(inputs.shape[0]):
         read_states(cars[0], log.states[k])
         if advance(cars, block, setup.block, inputs[k], measurements[k]):

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
-
 from cars import drive_of_other_car
+
 from estimators.limits import limits, sensitivities
 from estimators.offline_fit import offline_fit
 from twin import OUTPUTS, Twin, TwinError, Vehicle
 
 LOAD = {"mass": 200.0, "cm_x": -0.05, "Jzz": 300.0}
-SECONDS = 6.0
+SECONDS = 3.0
 
 
 @pytest.fixture(scope="module")

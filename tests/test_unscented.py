@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-
 from cars import drive_of_other_car
+
 from estimators.joint import JointObserver, JointSettings
 from estimators.unscented import unscented
 from twin import TwinError, Vehicle
@@ -47,9 +47,7 @@ def test_car_at_rest_teaches_nothing():
     drive, sd, _ = drive_of_other_car({}, seconds=2.0, snr=10.0)
     still = drive.inputs * 0.0
     still[:, 5:9] = 500.0
-    estimate = unscented(
-        Vehicle.load("suv"), drive.replace(inputs=still), sd, ("mass",), speed=0.0
-    )
+    estimate = unscented(Vehicle.load("suv"), drive.replace(inputs=still), sd, ("mass",), speed=0.0)
     assert (estimate["mass"] == 0.0).all()
 
 
