@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimators import joint_kernel
 from estimators.estimate import Estimate
+from estimators.joint_memory import RING, Log, Memory, Setup
 from estimators.observer import check_drive, check_measurements
-from estimators.joint_kernel import RING, Log, Memory, Setup
 from twin import (
     LOAD,
     OUTPUTS,
@@ -97,7 +97,7 @@ class JointSettings:
     surprise: float = 200.0
     least_change: float = 0.15
     valid_share: float = 0.2
-    drift: float = 0.001
+    drift: float = 0.0003
     step: float = 0.1
     hold_off: float = 1.0
     block: int = 10
@@ -151,7 +151,10 @@ class JointObserver:
     """
 
     def __init__(
-        self, vehicle: Vehicle, noise_sd: ArrayLike, settings: JointSettings = JointSettings()  # noqa: B008
+        self,
+        vehicle: Vehicle,
+        noise_sd: ArrayLike,
+        settings: JointSettings = JointSettings(),
     ) -> None:
         self.settings = settings
         names = settings.parameters
@@ -165,7 +168,7 @@ class JointObserver:
         first = self.fleet.twins[0]
         self.dt = first.dt
         self._setup = Setup(
-            index=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
+            parameter=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             offset=np.array([OFFSETS[name] for name in names]),
             fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
             step_limit=settings.step * self._prior,
@@ -194,7 +197,7 @@ class JointObserver:
         self._memory = Memory(
             theta=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
-            count=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
+            present=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
             excitation=np.zeros((2, 4)),
             information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
             ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
@@ -227,13 +230,13 @@ class JointObserver:
                     f"joint: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
                 )
             memory.theta[PARAMETERS.index(name)] = value
-        memory.z[: self._setup.index.size] = memory.theta[self._setup.index]
+        memory.z[: self._setup.parameter.size] = memory.theta[self._setup.parameter]
         memory.covariance[:] = np.diag(self._prior**2)
         memory.doubt[:] = self.settings.doubt
         for i, twin in enumerate(self.fleet.twins):
             p = memory.theta.copy()
             if i > 0:
-                p[self._setup.index[i - 1]] += self._setup.offset[i - 1]
+                p[self._setup.parameter[i - 1]] += self._setup.offset[i - 1]
             twin.set_parameters(p)
             twin.reset(speed, road)
 
@@ -261,7 +264,9 @@ class JointObserver:
         """Everything that decides the future; a run from it is bit-exact."""
         return JointSnapshot(
             tuple(twin.snapshot() for twin in self.fleet.twins),
-            Memory(*(array.copy() for array in self._memory)),
+            self._memory._replace(
+                **{name: array.copy() for name, array in self._memory._asdict().items()}
+            ),
         )
 
     def restore(self, snapshot: JointSnapshot) -> None:
@@ -298,7 +303,7 @@ class JointObserver:
             outputs=np.empty((n, len(OUTPUTS))),
             extended=np.empty((n, *twin.car.tyre_output.shape)),
             sd=np.empty((n, q)),
-            faults=np.empty((n, q - self._setup.index.size)),
+            faults=np.empty((n, q - self._setup.parameter.size)),
             changes=np.empty(n, dtype=np.int64),
         )
         done = joint_kernel.run(
@@ -329,8 +334,13 @@ def _check(settings: JointSettings, noise_sd: Array) -> None:
     unknown = [name for name in settings.parameters if name not in PARAMETERS]
     if unknown or len(set(settings.parameters)) < len(settings.parameters):
         raise TwinError(
-            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once of "
-            f"{', '.join(PARAMETERS)}"
+            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once "
+            f"of {', '.join(PARAMETERS)}"
+        )
+    if not set(settings.faults) <= set(FAULTS) or len(set(settings.faults)) < len(settings.faults):
+        raise TwinError(
+            f"joint: faults are {', '.join(settings.faults)}; allowed: each at most once of "
+            f"{', '.join(FAULTS)}"
         )
     if noise_sd.shape != (len(OUTPUTS),) or not (np.isnan(noise_sd) | (noise_sd > 0.0)).all():
         raise TwinError(

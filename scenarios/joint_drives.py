@@ -26,9 +26,7 @@ def _ramps(parts: list[tuple[float, float]], n: int, dt: float) -> Array:
     return speed
 
 
-def rough_patches(
-    distance: Array, starts: Array, length: float, sd: float, seed: int
-) -> Array:
+def rough_patches(distance: Array, starts: Array, length: float, sd: float, seed: int) -> Array:
     """(N, 4) road heights [m] under the wheels, rough on patches and flat between them.
 
     Left and right are independent, the rear wheels follow in the track of the front ones. The
@@ -91,7 +89,7 @@ def hard(dt: float = DT, duration: float | None = None) -> Manoeuvre:
     """A minute near the limit: full braking from 25 m/s, then bends of some 0.8 g."""
     n = round((duration or 60.0) / dt)
     time = np.arange(n) * dt
-    speed = _ramps([(1.0, 14.0), *[(4.5, 25.0), (2.2, 9.0), (3.3, 14.0)] * 8], n, dt)
+    speed = _ramps([(1.0, 14.0), *[(4.5, 25.0), (2.6, 9.0), (2.9, 14.0)] * 8], n, dt)
     phase = (time - 1.0) % 10.0
     turning = np.sin(np.pi * np.clip((phase - 6.2) / 3.4, 0.0, 1.0)) ** 2
     left = np.where((time - 1.0) % 20.0 < 10.0, 1.0, -1.0)
@@ -124,11 +122,13 @@ def half_of_a_trip(dt: float = DT, duration: float | None = None) -> Manoeuvre:
     time = np.arange(n) * dt
     driving = whole - 9.0
     middle = mixed(dt, driving)
-    speed = np.concatenate([
-        _ramps([(1.5, 0.0), (3.5, middle.speed[0])], round(5.0 / dt), dt) * 1.0,
-        middle.speed,
-        np.zeros(n - round(5.0 / dt) - middle.speed.size),
-    ])
+    speed = np.concatenate(
+        [
+            _ramps([(1.5, 0.0), (3.5, middle.speed[0])], round(5.0 / dt), dt) * 1.0,
+            middle.speed,
+            np.zeros(n - round(5.0 / dt) - middle.speed.size),
+        ]
+    )
     start = round(5.0 / dt)
     speed[:start] = np.where(time[:start] < 1.5, 0.0, speed[:start])
     braking = slice(start + middle.speed.size, n)
