@@ -287,7 +287,7 @@ def _lead(y, twin_y):
 
 
 @njit(cache=True)
-def advance_law(law, memory, y, twin_y, dt):
+def advance_law(law, memory, y, twin_y, dt, active=True):
     """The correction of a law's parameter in one sample.
 
     Args:
@@ -296,6 +296,7 @@ def advance_law(law, memory, y, twin_y, dt):
         y: (ny,) measurements; NaN is none, and corrects nothing.
         twin_y: (ny,) outputs of the twin.
         dt: sample time [s].
+        active: whether it may correct; its filters go on all the same.
     """
     a, a_twin = y[law.output], twin_y[law.output]
     if np.isnan(a):
@@ -315,6 +316,8 @@ def advance_law(law, memory, y, twin_y, dt):
         a_twin = _differentiate(memory, FILTER + 2, a_twin, law.filter_time, dt)
     instrument = _regressor(law, memory, a if law.measured else a_twin, dt)
     least = law.least_wheel_speed
+    if not active:
+        return 0.0
     if least > 0.0 and not (_moving(y, least) and _moving(twin_y, least)):
         return 0.0
     if is_elsewhere or abs(instrument) < law.least_signal:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import twin
 from estimators.estimate import Estimate
+from estimators.staged import Stage, StagedEstimate
 from scenarios import timeline_3d
 
 if TYPE_CHECKING:
@@ -90,6 +91,8 @@ def write_timeline(
     plots = [_parameter_plot(name, drive, estimate) for name in parameters]
     signals = dict.fromkeys([_SIGNAL[name] for name in parameters] or ["ax"])
     others = [*(_signal_plot(name, drive, estimate) for name in signals), _speed(drive, estimate)]
+    if isinstance(estimate, StagedEstimate):
+        plots.append(_stage(estimate))
     moved = timeline_3d.motion(drive, estimate, frames(drive.time))
     scene = timeline_3d.scene("vehicle" if drive.truth else "twin", moved)
     model = vehicle.compile()
@@ -213,6 +216,12 @@ def _speed(drive: twin.Drive, estimate: Estimate) -> Plot:
     )
     lines.append(Line("twin", "twin", estimate["vx"], TWIN, 3.0))
     return Plot("speed", "speed, vx [m/s]", lines)
+
+
+def _stage(estimate: StagedEstimate) -> Plot:
+    names = ", ".join(f"{stage.value} {stage.name.lower()}" for stage in Stage)
+    line = Line("stage", "stage", estimate.stage.astype(np.float64), TWIN, 2.5)
+    return Plot("stage", f"stage: {names}", [line])
 
 
 def send_plot(recording: rr.RecordingStream, time: Array, plot: Plot) -> None:

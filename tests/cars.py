@@ -7,7 +7,10 @@ import numpy as np
 from numba import njit
 
 import models
-from twin import INPUTS, TYRE_OUTPUTS, WHEELS, Twin, Vehicle
+from estimators.observer import Observer
+from scenarios.joint_drives import mixed
+from scenarios.record import record
+from twin import INPUTS, TYRE_OUTPUTS, WHEELS, Twin, Vehicle, noise_sd, with_noise
 from twin.kernel import read_states, step
 
 G = 9.81
@@ -157,3 +160,26 @@ def pairs(values):
 def drag(speed):
     """Air drag [N] along the body, by hand."""
     return -0.5 * AIR_DENSITY * DRAG_AREA * speed * abs(speed)
+
+
+def drive_of_other_car(load, *, seconds, snr, seed=0):
+    """A short rich drive of the SUV with other parameters than its file's, and no other difference.
+
+    Args:
+        load: deltas by name.
+        seconds: of the drive.
+        snr: of the sensors [dB]; inf: no noise.
+        seed: of the noise.
+
+    Returns:
+        The noisy drive, the (10,) standard deviations of a noise of 10 dB, and the speed at the
+        start [m/s].
+    """
+    vehicle = Vehicle.load("suv")
+    driven = record(vehicle, mixed(duration=seconds))
+    speed = float(driven.truth["vx"][0])
+    other = Observer(Twin(vehicle), [])
+    other.reset(speed, load)
+    clean = driven.replace(measurements=other.run(driven).outputs)
+    noisy = with_noise(clean, snr, np.random.default_rng(seed))
+    return noisy, noise_sd(clean.measurements, 10.0), speed

@@ -254,3 +254,18 @@ def test_law_that_needs_a_cars_outputs_is_refused_without_them(name):
     law = ParameterLaw(parameter="mass", signal="ax", **{name: 0.1})
     with pytest.raises(TwinError, match=rf"{name} is 0\.1; this black box, without"):
         compile_laws([law], DT, outputs=("ax",))
+
+
+def test_a_resting_law_corrects_nothing_and_keeps_its_filters():
+    law = ParameterLaw(
+        parameter="Jzz", signal="yaw_acceleration", form="sign", gain=1.0, mode_frequency=1.0
+    )
+    y = outputs(YAW_RATE, np.sin(np.arange(400) * 0.03))
+    always = corrections(law, y, 0.9 * y)
+    laws, memory = compile_laws([law], DT)
+    half = np.array(
+        [advance_law(laws[0], memory[0], y[k], 0.9 * y[k], DT, k >= 200) for k in range(len(y))]
+    )
+    assert (half[:200] == 0.0).all()
+    assert always[:200].any()
+    np.testing.assert_array_equal(half[200:], always[200:])

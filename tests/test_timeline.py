@@ -11,6 +11,7 @@ from rerun.chunk import RrdReader
 
 import twin
 from estimators.estimate import Estimate
+from estimators.staged import Stage, StagedEstimate
 from scenarios import timeline, timeline_3d
 from scenarios.timeline import view, write_timeline
 
@@ -366,3 +367,18 @@ def test_a_viewer_that_gives_up_is_told(monkeypatch):
     monkeypatch.setattr(subprocess, "run", lambda c, **_: subprocess.CompletedProcess(c, 1))
     with pytest.raises(twin.TwinError, match=r"run.rrd: the Rerun viewer gave up \(status 1\)"):
         view("run.rrd")
+
+
+def test_stages_of_a_staged_observer_are_drawn(tmp_path, vehicle):
+    plain = make_estimate()
+    stage = np.repeat(list(Stage), SAMPLES // len(Stage))
+    staged = StagedEstimate(
+        **{field.name: getattr(plain, field.name) for field in dataclasses.fields(plain)},
+        stage=stage,
+        estimated=("mass",),
+        sd=np.ones((SAMPLES, 1)),
+    )
+    without = write(tmp_path / "without.rrd", vehicle)
+    path = write(tmp_path / "with.rrd", vehicle, estimate=staged)
+    assert "/stage/stage" in {entity for entity, *_ in chunks(path)}
+    assert "/stage/stage" not in {entity for entity, *_ in chunks(without)}
