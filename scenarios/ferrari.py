@@ -22,7 +22,7 @@ from estimators.speed_follower import SpeedFollower
 from scenarios import calibrate
 from scenarios.calibrate import cut
 from scenarios.candidate import Candidate
-from scenarios.catalogue import Scenario, Settings
+from scenarios.catalogue import Scenario, Settings, Tuning
 from scenarios.ferrari_log import PARTS, data_file, load, part
 from scenarios.pictures import figure
 from scenarios.result import Result, Row
@@ -132,14 +132,16 @@ def run(settings: Settings) -> Result:
     )
 
 
-def tune(estimator: str, evaluations: int, jobs: int, path: Path) -> Result:
+def tune(tuning: Tuning) -> Result:
     """Calibrates the twin on the first two thirds of the log.
 
     Raises:
-        TwinError: another estimator is asked for, or the log is not there.
+        TwinError: another estimator is asked for, bounds or a cost are, or the log is not there.
     """
-    if estimator != "til":
-        raise TwinError(f"tune: estimator is {estimator!r}; allowed: til")
+    if tuning.estimator != "til":
+        raise TwinError(f"tune: estimator is {tuning.estimator!r}; allowed: til")
+    if tuning.bounds or tuning.cost:
+        raise TwinError("tune: ferrari takes no --bounds and no --cost; allowed: neither")
     file = data_file()
     drive = load(file)
     task = calibrate.Task(
@@ -149,7 +151,7 @@ def tune(estimator: str, evaluations: int, jobs: int, path: Path) -> Result:
         signals=SIGNALS,
         drive=cut(drive, part(drive, CALIBRATED_ON)),
     )
-    return calibrate.run(task, file, path, jobs=jobs, evaluations=evaluations)
+    return calibrate.run(task, file, tuning.path, jobs=tuning.jobs, evaluations=tuning.evaluations)
 
 
 def _drive(settings: Settings) -> Drive:

@@ -63,7 +63,7 @@ def measured(pieces: Sequence[Drive]) -> set[str]:
     for piece in pieces:
         finite = np.isfinite(piece.measurements).any(axis=0)
         names |= {name for name, there in zip(piece.output_names, finite, strict=True) if there}
-        moving = np.ptp(piece.inputs, axis=0) > 0.0
+        moving = np.atleast_1d(np.ptp(piece.inputs, axis=0) > 0.0)
         declared = (*TORQUES, *piece.settings.get("log", {}).get("constants", ()))
         moving |= [name not in declared for name in piece.input_names]
         names |= {name for name, there in zip(piece.input_names, moving, strict=True) if there}
