@@ -20,6 +20,7 @@ from twin import Drive
 Array = NDArray[np.float64]
 GRAVITY = 9.81
 SHAPE = 1.3  # C; Pacejka's for side force
+EVALUATIONS = 40  # the most, derivatives aside; the cost has settled by then
 
 
 class Geometry(NamedTuple):
@@ -84,7 +85,9 @@ def fit(
         found = predict(SingleTrack(*x), geometry, steering, drive, speed)
         return np.nan_to_num(found - sideslip, nan=1.0)
 
-    found = least_squares(error, start, bounds=(LOW, HIGH), x_scale=_SCALE, diff_step=1e-4)
+    found = least_squares(
+        error, start, bounds=(LOW, HIGH), x_scale=_SCALE, diff_step=1e-4, max_nfev=EVALUATIONS
+    )
     return SingleTrack(*found.x.tolist())
 
 

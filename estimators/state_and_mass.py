@@ -32,9 +32,9 @@ STATE_BOUNDS = {
     "pitch_rate": (0.1, 300.0),  # K_wy-wy [1/s]
     "yaw_rate": (0.1, 300.0),  # K_wz-wz [1/s]
 }
-# One more entry of K, ours: the yaw rate's innovation on the lateral speed. With the yaw rate held to
-# its measurement, what is left of its innovation is the yaw moment that the twin's tyres lack, and
-# with it goes an error of the lateral speed.
+# One more entry of K, ours: the yaw rate's innovation on the lateral speed. With the yaw rate held
+# to its measurement, what is left of its innovation is the yaw moment that the twin's tyres lack,
+# and with it goes an error of the lateral speed.
 CROSS_BOUNDS = {"yaw_rate_vy": (1.0, 1000.0)}  # K_wz-vy [m/s2 per rad/s]
 LEAST_SQUARES_BOUNDS = {
     "noise_density": (3e-3, 3.0),  # [m/s2 per root of Hz]

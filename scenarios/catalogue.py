@@ -148,6 +148,7 @@ SCENARIOS = {
     ),
 }
 
+_STATES = "scenarios.state_figures"
 _TABLES, _FIGURES = "scenarios.til_tables", "scenarios.til_figures"
 REPRODUCTIONS = {
     "til-table-3": Entry(f"{_TABLES}:table_3", "load parameters of the empty and loaded car"),
@@ -166,6 +167,18 @@ REPRODUCTIONS = {
     "til-figure-9": Entry(f"{_FIGURES}:figure_9", "pitch inertia over time"),
     "til-figure-10": Entry(f"{_FIGURES}:figure_10", "pitch inertia error over noise"),
     "til-figure-11": Entry(f"{_FIGURES}:figure_11", "pitch inertia error over the road's noise"),
+    "til-table-8": Entry(f"{_STATES}:table_8", "gains of the observers of sideslip and mass"),
+    "til-figure-14": Entry(f"{_STATES}:figure_14", "what the car does on the laps"),
+    "til-figure-15": Entry(f"{_STATES}:figure_15", "what the car does in the lane changes"),
+    "til-figure-16": Entry(f"{_STATES}:figure_16", "mass and sideslip on the laps"),
+    "til-figure-17": Entry(f"{_STATES}:figure_17", "the last part of the laps"),
+    "til-figure-18": Entry(f"{_STATES}:figure_18", "mass and sideslip in the lane changes"),
+    "til-joint-table": Entry(
+        f"{_STATES}:joint_table", "sideslip and mass of every observer on every real vehicle"
+    ),
+    "til-double-track-ramp": Entry(
+        f"{_STATES}:ramp", "the double track's mass is a ramp: three initial errors"
+    ),
     "kbf-table-2": Entry(f"{_TRUCK}_studies:table_2", "every filter in both readings of the noise"),
     "kbf-figure-5": Entry(f"{_TRUCK}_figures:figure_5", "the truck's velocities over time"),
     "kbf-figure-6": Entry(f"{_TRUCK}_figures:figure_6", "the truck's mass and inertia over time"),

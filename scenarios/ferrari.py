@@ -179,7 +179,9 @@ def picture(settings: Settings, path: Path) -> None:
         error = np.degrees(sideslip["til"] - truth)
         dots = below.scatter(x, y, c=error, s=3, cmap="coolwarm", vmin=-0.6, vmax=0.6)
         below.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        below.figure.colorbar(dots, ax=below, label="til: error [deg]")
+        below.figure.colorbar(
+            dots, ax=below, label="til: error [deg]", location="bottom", shrink=0.5
+        )
 
 
 def _track(drive: Drive, samples: slice) -> tuple[Array, Array]:

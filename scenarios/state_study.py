@@ -26,6 +26,7 @@ from twin import Drive, Twin, TwinError, Vehicle
 Array = NDArray[np.float64]
 
 TWIN = "sports_car"
+COMMONROAD = "commonroad"  # a real vehicle, the BMW 320i of another program; its twin is ours
 DRIVES = {"laps": laps, "lane-change": lane_changes}
 MISSING = -350.0  # [kg], TiL Section 5.3
 SNR = 20.0  # [dB]; chosen: a tenth of each signal, and not less than `twin.noise` has
@@ -54,7 +55,7 @@ class Run:
     """One observer over one noisy drive.
 
     Attributes:
-        case: the real vehicle, of `scenarios.mismatch.MISMATCHES`.
+        case: the real vehicle, of `scenarios.mismatch.MISMATCHES` or `COMMONROAD`.
         drive: of `DRIVES`.
         estimator: of `ESTIMATORS`, or `WITH_FORCES`.
         seed: of all noise.
@@ -95,25 +96,39 @@ class Belief:
 
 def twin_of(case: str) -> str:
     """The twin's car."""
-    return TWIN
+    return "bmw_320i" if case == COMMONROAD else TWIN
 
 
 @cache
 def clean_drive(case: str, drive: str, duration: float | None) -> Drive:
     """The real vehicle's drive, without noise."""
+    if case == COMMONROAD:
+        from scenarios import commonroad  # not at the top: an extra, and it compiles for long
+
+        return commonroad.record(manoeuvre(case, drive, duration))
     car = twin_of(case)
-    manoeuvre = _manoeuvre(drive, car, duration)
-    return record(real_vehicle(Vehicle.load(car), MISMATCHES[case]), manoeuvre, DRIVERS[car])
+    vehicle = real_vehicle(Vehicle.load(car), MISMATCHES[case])
+    return record(vehicle, manoeuvre(case, drive, duration), DRIVERS[car])
 
 
-def _manoeuvre(drive: str, car: str, duration: float | None) -> CourseManoeuvre:
-    return DRIVES[drive](duration=duration, limits=LIMITS[car])
+def manoeuvre(case: str, drive: str, duration: float | None) -> CourseManoeuvre:
+    """What the real vehicle is to do."""
+    if case != COMMONROAD:
+        return DRIVES[drive](duration=duration, limits=LIMITS[TWIN])
+    from scenarios import commonroad  # see `clean_drive`
+
+    limits = commonroad.COMMONROAD_LIMITS
+    if drive == "laps":
+        return laps(duration=duration, limits=limits)
+    return lane_changes(duration=duration, limits=limits, lateral=commonroad.LANE_CHANGE_LATERAL)
 
 
 def noisy_drive(run: Run) -> Drive:
     """The drive as the observer gets to see it."""
     clean = clean_drive(run.case, run.drive, run.duration)
-    return real_drive(clean, MISMATCHES[run.case], run.snr, np.random.default_rng(run.seed))
+    # another program's car has faults enough of its own
+    mismatch = MISMATCHES["same" if run.case == COMMONROAD else run.case]
+    return real_drive(clean, mismatch, run.snr, np.random.default_rng(run.seed))
 
 
 @cache
@@ -209,7 +224,7 @@ def _belief(found: Estimate, drive: Drive, missing: float) -> Belief:
 @cache
 def _map(case: str) -> static_map.StaticMap:
     """Fitted to laps of the mismatched car, with its true sideslip: more than a user has."""
-    own = case if case == "commonroad" else "mismatched"
+    own = case if case == COMMONROAD else "mismatched"
     drive = noisy_drive(Run(case=own, drive="laps", estimator="static-map", seed=FIT_SEED))
     return static_map.fit(*_map_inputs(drive), drive.truth["sideslip"])
 

@@ -40,6 +40,7 @@ _SIGNAL = {
     **{"Jxy": "pitch_rate", "Jxz": "yaw_rate", "Jyz": "pitch_rate"},
     **{"tyre_friction": "ay", "cornering_stiffness": "ay", "drag": "ax"},
     **{"spring": "roll_rate", "damper": "roll_rate"},
+    **dict.fromkeys(twin.FORCES, "ay"),
 }
 
 
@@ -192,7 +193,7 @@ def _parameter_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
             Line("truth", "truth", truth, TRUTH, 2.0),
         ]
     lines.append(Line("estimate", "estimate", estimate[name], TWIN, 2.5))
-    unit = "1" if name in twin.SCALES else {"m": "kg", "c": "m", "J": "kg m²"}[name[0]]
+    unit = "1" if name in twin.SCALES else {"m": "kg", "c": "m", "J": "kg m²", "a": "N"}[name[0]]
     return Plot(f"parameters/{name}", f"{name}: change from nominal [{unit}]", lines)
 
 

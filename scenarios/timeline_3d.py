@@ -226,14 +226,27 @@ def log_bodies(
     index: list[rr.TimeColumn],
     positions: Array,
     quaternions: Array,
+    *,
+    root: str = WORLD,
+    tint: tuple[float, float, float, float] | None = None,
 ) -> None:
-    """Logs the shapes of all bodies, and their poses over n frames as in `Poses`."""
+    """Logs the shapes of all bodies, and their poses over n frames as in `Poses`.
+
+    Args:
+        recording: to log to.
+        model: whose shapes.
+        index: of the frames.
+        positions: (n, nbody, 3) [m].
+        quaternions: (n, nbody, 4).
+        root: entity above the bodies.
+        tint: red, green, blue, opacity of all shapes; by default each has its own.
+    """
     import rerun as rr
 
     recording.log(WORLD, rr.ViewCoordinates.FLU, static=True)
     for body in np.unique(model.geom_bodyid[model.geom_bodyid > 0]):
-        name = f"{WORLD}/{model.body(body).name}"
-        _log_shapes(recording, name, model, body)
+        name = f"{root}/{model.body(body).name}"
+        _log_shapes(recording, name, model, body, tint)
         columns = rr.Transform3D.columns(
             translation=positions[:, body],
             quaternion=quaternions[:, body][:, [1, 2, 3, 0]],
@@ -253,7 +266,11 @@ def _log_forces(
 
 
 def _log_shapes(
-    recording: rr.RecordingStream, entity: str, model: mujoco.MjModel, body: int
+    recording: rr.RecordingStream,
+    entity: str,
+    model: mujoco.MjModel,
+    body: int,
+    tint: tuple[float, float, float, float] | None,
 ) -> None:
     """Logs a body's boxes, cylinders and ellipsoids in its frame; other shapes are left out."""
     import rerun as rr
@@ -266,7 +283,7 @@ def _log_shapes(
         common = {
             "centers": model.geom_pos[geoms],
             "quaternions": model.geom_quat[geoms][:, [1, 2, 3, 0]],
-            "colors": _colours(model, geoms),
+            "colors": _colours(model, geoms) if tint is None else [tint] * len(geoms),
             "fill_mode": "solid",
         }
         if shape == "boxes":

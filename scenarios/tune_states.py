@@ -103,6 +103,7 @@ def run(case: str, tuning: Tuning) -> Result:
         "snr": state_study.SNR,
         "starts": list(STARTS[cost]),
         "seconds": list(DURATIONS.values()) if cost == "robust" else [LAP],
+        "bounds": {gain.name: [gain.low, gain.high] for gain in objective.gains},
     }
     gains_file.write(tuning.path, vehicle=car, estimator=estimator, tuned=tuned, made=made)
     return Result(

@@ -14,7 +14,7 @@ from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, TYRE_OUTPUTS, WHEELS, Twin
 from twin.commonroad_model import GRAVITY, bmw_320i
 
 CAR = bmw_320i()
-COURSE = lane_changes(limits=COMMONROAD_LIMITS, lateral=LANE_CHANGE_LATERAL, duration=40.0)
+COURSE = lane_changes(limits=COMMONROAD_LIMITS, lateral=LANE_CHANGE_LATERAL, duration=30.0)
 
 LAP = laps(limits=COMMONROAD_LIMITS, duration=30.0)
 

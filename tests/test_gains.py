@@ -1,6 +1,7 @@
 import pytest
 
 from scenarios import gains, state_study
+from scenarios.__main__ import main
 from scenarios.state_study import BOUNDS
 from scenarios.tune import Tuned
 from twin import TwinError
@@ -34,7 +35,7 @@ def test_best_evaluated_gains_come_back(file):
 )
 def test_gains_for_something_else_are_refused(file, changes, message):
     wanted = {"vehicle": "suv", "estimator": "til", "names": ["a"]} | changes
-    with pytest.raises(TwinError, match=f"gains.toml: {message}"):
+    with pytest.raises(TwinError, match=rf"gains\.toml: {message}"):
         gains.read(file, **wanted)
 
 
@@ -43,7 +44,7 @@ def test_file_that_is_none_is_named(tmp_path, text, message):
     path = tmp_path / "x.toml"
     if text:
         path.write_text(text)
-    with pytest.raises(TwinError, match=f"x.toml: {message}"):
+    with pytest.raises(TwinError, match=rf"x\.toml: {message}"):
         gains.read(path, vehicle="suv", estimator="til", names=["a"])
 
 
@@ -53,3 +54,22 @@ def test_shipped_gains_lie_within_their_bounds(car, estimator):
     for name, value in state_study.gains_of(car, estimator).items():
         low, high = BOUNDS[estimator][name]
         assert low * 0.999 <= value <= high * 1.001
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["tune", "laps", "--bounds", "ay_vy", "0.5", "0.1"], "bounds of ay_vy are 0.5 to 0.1"),
+        (["tune", "mass", "--bounds", "drift", "1", "2"], "has no gain 'drift'; allowed: mass"),
+        (["tune", "laps", "--estimator", "zero"], "estimator is 'zero'; allowed: til"),
+        (["run", "mass", "--gains", "x.toml"], "--gains: mass takes none; allowed: laps"),
+        (["run", "laps", "--gains", "x.toml"], "x.toml: cannot be read"),
+    ],
+)
+def test_mistake_on_the_command_line_is_one_line(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert message in err

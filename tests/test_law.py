@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimators.law import PP, ParameterLaw, _regressor, advance_law, compile_laws
-from twin import OUTPUTS
+from twin import OUTPUTS, TwinError
 
 DT = 1e-3
 YAW_RATE, AX = OUTPUTS.index("yaw_rate"), OUTPUTS.index("ax")
@@ -189,3 +189,68 @@ def test_drift_makes_the_variance_grow_where_nothing_is_learnt():
     for _ in range(1000):
         advance_law(laws[0], memory[0], nothing, nothing, DT)
     assert memory[0, PP] == pytest.approx(10.0**2 + 4.0**2 * 1.0)
+
+
+def full(**channels):
+    """One sample of outputs, zero but for some."""
+    y = np.zeros(len(OUTPUTS))
+    for name, value in channels.items():
+        y[OUTPUTS.index(name)] = value
+    return y
+
+
+GATED = ParameterLaw(
+    parameter="mass", signal="ax", form="sign", gain=1.0, largest_yaw_rate=0.05, least_signal=1.5
+)
+
+
+@pytest.mark.parametrize(
+    ("y", "twin_y", "moves"),
+    [
+        ({"ax": 3.0, "yaw_rate": 0.04}, {"ax": 2.0}, True),
+        ({"ax": 3.0, "yaw_rate": -0.06}, {"ax": 2.0}, False),
+        ({"ax": 3.0, "yaw_rate": np.nan}, {"ax": 2.0}, False),
+        ({"ax": 3.0}, {"ax": 2.0, "yaw_rate": 0.3}, True),
+        ({"ax": 3.0}, {"ax": 1.4}, False),
+        ({"ax": -1.0}, {"ax": -1.6}, True),
+    ],
+)
+def test_gates_look_at_the_measured_yaw_rate_and_at_the_instrument(y, twin_y, moves):
+    added = corrections(GATED, [full(**y)], [full(**twin_y)])
+    assert bool(added[0]) is moves
+
+
+def test_compensation_takes_the_wheels_lead_out_of_the_twins_signal():
+    """Each rad/s by which a measured wheel is ahead is worth the same."""
+    law = ParameterLaw(parameter="mass", signal="ax", form="integral", gain=1.0, compensation=0.25)
+    y = full(ax=2.0, wheel_speed_fl=3.0, wheel_speed_rr=np.nan)
+    twin_y = full(ax=2.0, wheel_speed_fl=1.0, wheel_speed_rr=5.0)
+    added = corrections(law, [y], [twin_y])
+    assert added[0] == pytest.approx(DT * 0.25 * 2.0)
+
+
+def test_integral_law_leaks_to_a_share_of_what_is_missing():
+    """F' = k (missing - F) - leak F settles at k / (k + leak), at the rate k + leak."""
+    law = ParameterLaw(
+        parameter="axle_force_front", signal="ay", form="integral", gain=6.0, leak=2.0
+    )
+    laws, memory = compile_laws([law], DT)
+    force, history = 0.0, []
+    for _ in range(2000):
+        force += advance_law(laws[0], memory[0], full(ay=1.0), full(ay=force), DT)
+        history.append(force)
+    assert force == pytest.approx(6.0 / 8.0, rel=1e-4)
+    assert history[round(1.0 / 8.0 / DT)] == pytest.approx(0.75 * (1.0 - np.exp(-1.0)), rel=0.02)
+
+
+def test_integral_law_may_have_a_negative_gain_and_others_may_not():
+    ParameterLaw(parameter="axle_force_rear", signal="yaw_rate", form="integral", gain=-3.0)
+    with pytest.raises(TwinError, match=r"gain is -3\.0"):
+        ParameterLaw(parameter="mass", signal="ax", form="sign", gain=-3.0)
+
+
+@pytest.mark.parametrize("name", ["largest_yaw_rate", "compensation"])
+def test_law_that_needs_a_cars_outputs_is_refused_without_them(name):
+    law = ParameterLaw(parameter="mass", signal="ax", **{name: 0.1})
+    with pytest.raises(TwinError, match=rf"{name} is 0\.1; this black box, without"):
+        compile_laws([law], DT, outputs=("ax",))

@@ -200,7 +200,7 @@ def test_mass_bound_from_acceleration_is_that_of_force_over_mass():
 
 def test_sensitivities_hang_on_neither_the_twin_s_past_nor_the_other_parameters():
     twin = Twin(Vehicle.load("suv"))
-    twin.set_parameters(np.array([100.0, *np.zeros(14)]))
+    twin.set_parameters(np.array([100.0, *np.zeros(16)]))
     twin.reset(30.0)
     drive = real_drive(mass.STUDY.target, SHORT)
     both = sensitivities(twin, drive, ["cm_x", "mass"], variation(), speed=0.0)

@@ -137,7 +137,7 @@ def test_missing_measurement_is_nan_and_its_estimates_are_named(tmp_path):
     assert np.isnan(drive.channel("yaw_rate")).all()
     assert "Not in the log, hence NaN: ay, az, roll_rate" in done(drive)
     assert "Jzz cannot be estimated without yaw_rate, steering_wheel_angle." in done(drive)
-    assert "mass cannot be estimated without drive_torque_fl" in done(drive)
+    assert "mass cannot be estimated without drive_torque_*, brake_torque_*." in done(drive)
 
 
 def test_further_measurements_stand_behind_the_twins_outputs(tmp_path):
@@ -158,7 +158,7 @@ def test_log_without_torques_has_no_torque_inputs_and_is_marked(tmp_path):
     assert drive.input_names == ("steering_wheel_angle", *(f"road_height_{w}" for w in WHEELS))
     assert drive.settings["log"]["follow_speed"] is True
     assert "the twin is to follow the measured vx" in done(drive)
-    assert "mass cannot be estimated without ax, drive_torque_fl" in done(drive)
+    assert "mass cannot be estimated without ax, drive_torque_*, brake_torque_*." in done(drive)
 
 
 def test_gap_in_a_measurement_is_nan_and_short_ones_are_bridged(tmp_path):
@@ -187,6 +187,7 @@ def test_log_faster_than_the_drive_is_averaged_not_picked(tmp_path):
     tone = np.sin(2.0 * np.pi * 1010.0 * time)  # picked at 1 kHz it would be one of 10 Hz
     drive = simple(tmp_path, {"t": time, "a": tone}, '[channels.ax]\nname="a"\nunit="m/s2"\n')
     assert np.nanmax(np.abs(drive.channel("ax")[2:-2])) < 0.05
+    assert "averaged over each sample of the drive" in done(drive)
 
 
 @pytest.mark.parametrize(

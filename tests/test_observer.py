@@ -221,3 +221,17 @@ def test_estimate_names_what_it_has(drive):
     assert estimate.nominal[PARAMETERS.index("mass")] == 2125.8
     with pytest.raises(TwinError, match="has no 'beta'"):
         estimate["beta"]
+
+
+def test_corrections_at_every_tenth_sample_leave_the_others_alone(drive):
+    til = Observer(Twin(Vehicle.load("suv")), [PAPER], {("yaw_rate", "yaw_rate"): 5.0}, every=10)
+    til.reset(0.0, known())
+    mass = til.run(drive)["mass"]
+    changes = np.flatnonzero(np.diff(mass)) + 1
+    assert changes.size > 500
+    assert set(changes % 10) == {9}
+
+
+def test_observer_that_never_corrects_is_refused():
+    with pytest.raises(TwinError, match="every is 0; allowed: 1 or more"):
+        Observer(Twin(Vehicle.load("suv")), [], every=0)

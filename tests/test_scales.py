@@ -91,3 +91,17 @@ def test_downforce_loads_the_axles_as_its_areas_say(tmp_path):
         loads.append(twin.tyre_forces()[:, 2])
     gain = (loads[1] - loads[0]).reshape(2, 2).sum(axis=1)
     np.testing.assert_allclose(gain, 0.5 * 1.2 * 50.0**2 * np.array([0.4, 1.0]), rtol=0.01)
+
+
+def test_scale_of_an_axle_leaves_the_other_alone():
+    before = Vehicle.load("suv").tyres()
+    after = (
+        Vehicle.load("suv").scaled(rear_cornering_stiffness=1.2, cornering_stiffness=0.9).tyres()
+    )
+    np.testing.assert_allclose(after["lky"] / before["lky"], [0.9, 0.9, 1.08, 1.08])
+
+
+def test_steering_ratio_and_anti_roll_bar_scale():
+    model = Vehicle.load("suv").scaled(steering_ratio=1.1, front_anti_roll=2.0).compile()
+    assert model.numeric("steering_ratio").data[0] == pytest.approx(16.0 * 1.1)
+    assert list(model.tendon_stiffness[:2]) == pytest.approx([40000.0, 10000.0])

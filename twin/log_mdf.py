@@ -83,7 +83,7 @@ def read_log(path: Path, time: tuple[str | None, float | None]) -> RawLog:
 def _read(path: Path) -> tuple[RawLog, str]:
     check_mdf(path)
     asammdf = _asammdf(path)
-    fault = ""
+    fault, comment, channels, text = "", "", {}, {}
     # On a damaged file asammdf leaves a half-made object behind, whose end is noisy
     noise, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:

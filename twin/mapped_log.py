@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.channels import FURTHER_OUTPUTS, OUTPUTS
+from twin.channels import FURTHER_OUTPUTS, OUTPUTS, WHEELS
 from twin.drive import Drive
 from twin.errors import TwinError
 from twin.log_formats import format_of
 from twin.log_map import TORQUES, LogMap, Source, unit_in_si
 from twin.raw_log import Array, Channel, RawLog, check_size, listed
-from twin.resampling import gaps, resample
+from twin.resampling import FASTER, gaps, resample
 from twin.units import our_unit
 
 _SPEED = "vx or the wheel speeds"
@@ -58,7 +58,7 @@ def drive_of(log: RawLog, log_map: LogMap) -> Drive:
     columns = {}
     for name, channel in ours.items():
         columns[name] = resample(channel.time, channel.values, grid, log_map.longest_gap)
-        done.append(_about_channel(name, log_map.channels[name], channel, columns[name]))
+        done.append(_about_channel(name, log_map, channel, columns[name]))
     kept = {
         name: resample(channel.time, channel.values, grid, log_map.longest_gap)
         for name, channel in truth.items()
@@ -154,7 +154,8 @@ def _about_time(grid: Array, log_map: LogMap) -> list[str]:
     ]
 
 
-def _about_channel(name: str, source: Source, channel: Channel, values: Array) -> str:
+def _about_channel(name: str, log_map: LogMap, channel: Channel, values: Array) -> str:
+    source = log_map.channels[name]
     rate = (channel.time.size - 1) / max(channel.time[-1] - channel.time[0], 1e-12)
     parts = [f"{name}: from {source.name!r} in {channel.unit} at {rate:.4g} Hz"]
     if source.sign < 0.0:
@@ -167,6 +168,8 @@ def _about_channel(name: str, source: Source, channel: Channel, values: Array) -
         parts.append(f"over a radius of {source.radius:g} m")
     if source.delay:
         parts.append(f"brought forward by {source.delay:g} s")
+    if rate > FASTER * log_map.rate:
+        parts.append("averaged over each sample of the drive")
     missing = int(np.count_nonzero(np.isnan(values)))
     if missing:
         parts.append(f"{missing} samples missing in {len(gaps(channel.time))} gaps and at the ends")
@@ -186,7 +189,13 @@ def _about_estimates(columns: Mapping[str, Array], log_map: LogMap) -> list[str]
         known.add(_SPEED)
     sentences = []
     for quantity, needed in NEEDS.items():
-        lacking = [name for name in needed if name not in known]
+        lacking = dict.fromkeys(_of_all_wheels(name) for name in needed if name not in known)
         if lacking:
             sentences.append(f"{quantity} cannot be estimated without {', '.join(lacking)}.")
     return sentences
+
+
+def _of_all_wheels(name: str) -> str:
+    """The name of a wheel's channel as that of all four."""
+    stem, _, wheel = name.rpartition("_")
+    return f"{stem}_*" if wheel in WHEELS else name

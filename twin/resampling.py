@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 _STEPS_OF_A_GAP = 2.5
 # A channel faster than the drive by more than this is averaged over the drive's step, so that what
 # is above half its rate does not come back as something slow; chosen
-_FASTER = 1.5
+FASTER = 1.5
 
 
 def resample(time: Array, values: Array, grid: Array, longest_gap: float) -> Array:
@@ -34,7 +34,7 @@ def resample(time: Array, values: Array, grid: Array, longest_gap: float) -> Arr
     slack = 1e-3 * dt  # times of a file are rounded
     inside = (grid > time[0] - slack) & (grid < time[-1] + slack)
     at = np.clip(grid, time[0], time[-1])
-    faster = step * _FASTER < dt
+    faster = step * FASTER < dt
     result = _averages(time, values, at, dt) if faster else np.interp(at, time, values)
     after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
     wide = time[after] - time[after - 1] > max(longest_gap, _STEPS_OF_A_GAP * step)

@@ -51,7 +51,7 @@ def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
             factor = np.ones(len(WHEELS))
             factor[wheels] = factors.get(axle + name, 1.0)
             for key in keys:
-                tyres[key] = tyres[key] * factor
+                tyres[key] = np.asarray(tyres[key], dtype=np.float64) * factor
 
 
 def scale_model(model: mujoco.MjModel, factors: Mapping[str, float]) -> None:

@@ -22,15 +22,21 @@ from typing import Any
 from numba import njit
 
 from twin.elementary import atan, clip, cos, exp, sin
-from twin.lanes import absolute, anywhere, copysign, inlined, maximum, minimum, sqrt, where
+from twin.lanes import absolute, anywhere, copysign, inlined, maximum, where
+from twin.tyre_moments import (
+    force_arm,
+    overturning_moment,
+    residual_torque,
+    rolling_resistance,
+    trail,
+)
+from twin.tyre_shapes import LEAST_SHARE, bend, cos_arctan, sin_2_arctan
 
 Tyre = Any  # numpy.void, whose fields compiled code reads as attributes
 
 LEAST_FRICTION = 0.01  # peak friction coefficient, chosen: below wet ice
-LEAST_SHARE = 0.05  # of a factor that the formula could drive to zero or beyond, chosen
 LEAST_RELAXATION = 0.02  # [m], chosen: a lightly loaded tyre answers at once, but not faster
 LARGEST_SLIP = 1e6  # longitudinal slip; the force is that of sliding long before
-FASTEST = 10.0  # limit of the speed over LONGVL in the rolling resistance
 ROLLING_SPEED = 0.1  # [m/s], chosen: below it rolling resistance and trail fade out
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
@@ -89,18 +95,18 @@ def magic_formula(
             is_6, weight * _upright_lateral(tyre, fz, dfz, nominal, alpha), fy_weighted
         )
 
-    trail = travel * _trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx / ky)
-    residual = _residual_torque(
+    trail_length = travel * trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx / ky)
+    residual = residual_torque(
         tyre, fz, dfz, kappa, alpha, gamma, kx / ky, shift_h + shift_v / ky, ky / (mu_y * fz)
     )
-    arm = _force_arm(tyre, dfz, nominal, fy, gamma)
+    arm = force_arm(tyre, dfz, nominal, fy, gamma)
 
     return (
         share * fx,
         share * fy * side,
-        share * _overturning_moment(tyre, fz, nominal, fy, gamma) * side,
-        -share * travel * _rolling_resistance(tyre, fz, nominal, fx, vx, gamma),
-        share * (-trail * fy_weighted + residual + arm * fx) * side,  # (4.E71), (4.E72)
+        share * overturning_moment(tyre, fz, nominal, fy, gamma) * side,
+        -share * travel * rolling_resistance(tyre, fz, nominal, fx, vx, gamma),
+        share * (-trail_length * fy_weighted + residual + arm * fx) * side,  # (4.E71), (4.E72)
     )
 
 
@@ -138,7 +144,7 @@ def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, floa
     inclination = _inclination(tyre, gamma)
     gamma = inclination * tyre.lgay
     along = fz * (tyre.ptx1 + tyre.ptx2 * dfz) * exp(tyre.ptx3 * dfz) / nominal
-    across = tyre.pty1 * _sin_2_arctan(fz / (tyre.pty2 * nominal)) * tyre.lfzo
+    across = tyre.pty1 * sin_2_arctan(fz / (tyre.pty2 * nominal)) * tyre.lfzo
     across *= maximum(1.0 - tyre.pky3 * absolute(gamma), LEAST_SHARE)
     along, across = along * tyre.unloaded_radius, across * tyre.unloaded_radius
     is_6 = tyre.mf6 > 0.0
@@ -185,7 +191,7 @@ def _pure_longitudinal(tyre, fz, dfz, kappa, gamma, kx):
     d = maximum(mu, LEAST_FRICTION) * fz
     e = (tyre.pex1 + dfz * (tyre.pex2 + dfz * tyre.pex3)) * (1.0 - tyre.pex4 * copysign(1.0, slip))
     b = kx / (c * d)
-    return d * sin(c * _bend(b * slip, e * tyre.lex)) + shift_v
+    return d * sin(c * bend(b * slip, e * tyre.lex)) + shift_v
 
 
 @inlined
@@ -198,7 +204,7 @@ def _pure_lateral(tyre, fz, dfz, alpha, gamma, ky, mu, shift_h, shift_v):
     bent = (tyre.pey3 + tyre.pey4 * gamma * tyre.lgay) * copysign(1.0, slip)
     e *= 1.0 + tyre.pey5 * gamma * gamma - bent
     b = ky / (c * d)
-    return d * sin(c * _bend(b * slip, e)) + shift_v
+    return d * sin(c * bend(b * slip, e)) + shift_v
 
 
 @inlined
@@ -215,7 +221,7 @@ def _upright_lateral(tyre, fz, dfz, nominal, alpha):
 def _longitudinal_weight(tyre, dfz, kappa, alpha, gamma):
     """Returns G_xalpha, the share of F_x0 that side slip leaves. (4.E50)-(4.E57)."""
     b = tyre.rbx1 + tyre.rbx3 * gamma * gamma
-    b *= _cos_arctan(tyre.rbx2 * kappa) * tyre.lxal
+    b *= cos_arctan(tyre.rbx2 * kappa) * tyre.lxal
     return _weight(b, tyre.rcx1, tyre.rex1 + tyre.rex2 * dfz, alpha, tyre.rhx1)
 
 
@@ -223,7 +229,7 @@ def _longitudinal_weight(tyre, dfz, kappa, alpha, gamma):
 def _lateral_weight(tyre, dfz, kappa, alpha, gamma):
     """Returns G_ykappa, the share of F_y0 that longitudinal slip leaves. (4.E59)-(4.E65)."""
     b = tyre.rby1 + tyre.rby4 * gamma * gamma
-    b *= _cos_arctan(tyre.rby2 * (alpha - tyre.rby3)) * tyre.lyka
+    b *= cos_arctan(tyre.rby2 * (alpha - tyre.rby3)) * tyre.lyka
     shift = tyre.rhy1 + tyre.rhy2 * dfz
     return _weight(b, tyre.rcy1, tyre.rey1 + tyre.rey2 * dfz, kappa, shift)
 
@@ -231,24 +237,8 @@ def _lateral_weight(tyre, dfz, kappa, alpha, gamma):
 @inlined
 def _weight(b, c, e, slip, shift):
     """Returns a cosine weight that is 1 at no slip and falls to nought. (4.E51), (4.E59)."""
-    weight = maximum(cos(c * _bend(b * (slip + shift), e)), 0.0)
-    return weight / maximum(cos(c * _bend(b * shift, e)), LEAST_SHARE)
-
-
-@inlined
-def _bend(x, e):
-    """Returns the inner angle of the Magic Formula, its curvature E limited to 1. (4.E14)."""
-    return atan(x - minimum(e, 1.0) * (x - atan(x)))
-
-
-@inlined
-def _cos_arctan(x):
-    return 1.0 / sqrt(1.0 + x * x)
-
-
-@inlined
-def _sin_2_arctan(x):
-    return 2.0 * x / (1.0 + x * x)
+    weight = maximum(cos(c * bend(b * (slip + shift), e)), 0.0)
+    return weight / maximum(cos(c * bend(b * shift, e)), LEAST_SHARE)
 
 
 @inlined
@@ -281,7 +271,7 @@ def _slip_stiffness(tyre, fz, dfz):
 @inlined
 def _cornering_stiffness(tyre, fz, nominal, gamma):
     """Returns K_yalpha < 0 [N/rad]. (4.E25), in MF 5.2 with 1 - p_Ky3 |gamma|."""
-    rise = _sin_2_arctan(fz / (tyre.pky2 * nominal))
+    rise = sin_2_arctan(fz / (tyre.pky2 * nominal))
     is_6 = tyre.mf6 > 0.0
     if anywhere(is_6):  # p_Ky4 for 2, and p_Ky5
         at = maximum(tyre.pky2 + tyre.pky5 * gamma * gamma, LEAST_SHARE * tyre.pky2)
@@ -318,102 +308,5 @@ def _lateral_shifts(tyre, fz, dfz, gamma, ky):
 def _slip_induced_side_force(tyre, fz, dfz, kappa, alpha, gamma, mu_y):
     """Returns S_Vykappa [N], the side force that driving or braking induces. (4.E66), (4.E67)."""
     d = mu_y * fz * (tyre.rvy1 + tyre.rvy2 * dfz + tyre.rvy3 * gamma)
-    d *= _cos_arctan(tyre.rvy4 * alpha)
+    d *= cos_arctan(tyre.rvy4 * alpha)
     return d * sin(tyre.rvy5 * atan(tyre.rvy6 * kappa)) * tyre.lvyka
-
-
-@inlined
-def _trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx_over_ky):
-    """Returns the pneumatic trail t [m] at combined slip. (4.E33)-(4.E35), (4.E40)-(4.E44)."""
-    gamma = gamma * tyre.lgaz
-    shift = tyre.qhz1 + tyre.qhz2 * dfz + (tyre.qhz3 + tyre.qhz4 * dfz) * gamma
-    b = tyre.qbz1 + dfz * (tyre.qbz2 + dfz * tyre.qbz3)
-    b *= (1.0 + tyre.qbz4 * gamma + tyre.qbz5 * absolute(gamma)) * tyre.lky / tyre.lmuy
-    c = tyre.qcz1
-    d = (tyre.qdz1 + tyre.qdz2 * dfz) * (1.0 + gamma * (tyre.qdz3 + gamma * tyre.qdz4))
-    d *= fz * tyre.unloaded_radius / nominal * tyre.ltr
-    e = tyre.qez1 + dfz * (tyre.qez2 + dfz * tyre.qez3)
-    e *= 1.0 + (tyre.qez4 + tyre.qez5 * gamma) * 2.0 / pi * atan(b * c * (alpha + shift))
-    slip = _equivalent_slip(alpha + shift, kappa, kx_over_ky)
-    return d * cos(c * _bend(b * slip, e)) * cos(alpha)
-
-
-@inlined
-def _residual_torque(tyre, fz, dfz, kappa, alpha, gamma, kx_over_ky, shift, by_cy):
-    """Returns M_zr [N m] at combined slip. (4.E36)-(4.E38), (4.E45)-(4.E47), (4.E75)."""
-    gamma = gamma * tyre.lgaz
-    b = tyre.qbz9 * tyre.lky / tyre.lmuy + tyre.qbz10 * by_cy
-    camber = tyre.qdz8 + tyre.qdz9 * dfz + (tyre.qdz10 + tyre.qdz11 * dfz) * absolute(gamma)
-    d = (tyre.qdz6 + tyre.qdz7 * dfz) * tyre.lres + camber * gamma
-    d *= fz * tyre.unloaded_radius * tyre.lmuy
-    slip = _equivalent_slip(alpha + shift, kappa, kx_over_ky)
-    return d * _cos_arctan(b * slip) * cos(alpha)
-
-
-@inlined
-def _equivalent_slip(alpha, kappa, kx_over_ky):
-    """Returns the size of the equivalent slip angle [rad]. (4.E77), (4.E78).
-
-    Its sign is left out: trail and residual torque are even in it. The squared tangent is taken
-    from the sine, which costs a third of it.
-    """
-    sine, longitudinal = sin(alpha), kx_over_ky * kappa
-    tangent_squared = sine * sine / (1.0 - sine * sine)
-    return atan(sqrt(tangent_squared + longitudinal * longitudinal))
-
-
-@inlined
-def _force_arm(tyre, dfz, nominal, fy, gamma):
-    """Returns s [m], the arm of F_x about the contact's normal. (4.E76)."""
-    share = tyre.ssz1 + tyre.ssz2 * fy / nominal
-    share += (tyre.ssz3 + tyre.ssz4 * dfz) * gamma * tyre.lgaz
-    return share * tyre.unloaded_radius * tyre.ls
-
-
-@inlined
-def _overturning_moment(tyre, fz, nominal, fy, gamma):
-    """Returns M_x [N m]. (4.E69)."""
-    side = fy / nominal
-    share = tyre.qsx1 * tyre.lvmx + (tyre.qsx3 * side - tyre.qsx2 * gamma) * tyre.lmx
-    is_6 = tyre.mf6 > 0.0
-    if anywhere(is_6):  # q_Sx12 to q_Sx14: equation manual of MF-Tyre 6.1.2
-        load = fz / nominal
-        wave = sin(tyre.qsx7 * gamma + tyre.qsx8 * atan(tyre.qsx9 * side))
-        size = absolute(gamma)
-        more = tyre.qsx4 * cos(tyre.qsx5 * atan((tyre.qsx6 * load) * (tyre.qsx6 * load))) * wave
-        more += (tyre.qsx10 * atan(tyre.qsx11 * load) - tyre.qsx12 * size) * gamma
-        more += fy / fz * (tyre.qsx13 + tyre.qsx14 * size)
-        share += where(is_6, more * tyre.lmx, 0.0)
-    return share * fz * tyre.unloaded_radius
-
-
-@inlined
-def _rolling_resistance(tyre, fz, nominal, fx, vx, gamma):
-    """Returns the size of M_y [N m], not negative. (4.E70), in MF 5.2 in steady state.
-
-    MF 6: (A48) of Besselink et al. 2010, in which the load counts by its power q_Sy7 only.
-    """
-    speed = minimum(absolute(vx) / tyre.longvl, FASTEST)
-    share = (
-        tyre.qsy1
-        + tyre.qsy2 * fx / nominal
-        + tyre.qsy3 * speed
-        + tyre.qsy4 * (speed * speed) * (speed * speed)
-    )
-    load = fz
-    is_6 = tyre.mf6 > 0.0
-    if anywhere(is_6):
-        tilted = (tyre.qsy5 + tyre.qsy6 * fz / nominal) * gamma * gamma
-        share += where(is_6, tilted, 0.0)
-        load = where(is_6, nominal * _power(fz / nominal, tyre.qsy7), fz)
-    return maximum(share, 0.0) * load * tyre.unloaded_radius * tyre.lmy
-
-
-@inlined
-def _power(x, exponent):
-    """Returns x^exponent for x from 0.001 to 1000, its logarithm by Halley's method."""
-    logarithm = 2.0 * (x - 1.0) / (x + 1.0)
-    for _ in range(6):
-        reached = exp(logarithm)
-        logarithm += 2.0 * (x - reached) / (x + reached)
-    return exp(exponent * logarithm)
