@@ -95,13 +95,13 @@ def joint_table(seeds: int, jobs: int, out: Path) -> Result:
     start = time.perf_counter()
     some = range(seeds)
     todo = [
-        *state_study.runs(["same"], state_study.DRIVES, ESTIMATORS, some),
-        *state_study.runs([CASE], state_study.DRIVES, (*ESTIMATORS, WITH_FORCES), some),
+        *state_study.runs(["same"], tuple(state_study.DRIVES), ESTIMATORS, some),
+        *state_study.runs([CASE], tuple(state_study.DRIVES), (*ESTIMATORS, WITH_FORCES), some),
         *state_study.runs(SINGLE, ["laps"], ["til"], some),
     ]
     others = find_spec("vehiclemodels") is not None
     if others:
-        todo += state_study.runs([COMMONROAD], state_study.DRIVES, ESTIMATORS, some)
+        todo += state_study.runs([COMMONROAD], tuple(state_study.DRIVES), ESTIMATORS, some)
     rows = laps.rows(todo, jobs, "til-joint-table")
     vehicles = {name: MISMATCHES[name].summary for name in ("same", CASE, *SINGLE)}
     vehicles[COMMONROAD] = (

@@ -190,7 +190,8 @@ def _first_points(objective: Objective) -> list[Point]:
         for gain, (low, high) in zip(objective.gains, box, strict=True)
     )
     # 2^4 of them, as Sobol wants a power of two; what is too many is left
-    spread = qmc.scale(qmc.Sobol(len(box), seed=0).random_base2(4), *np.transpose(box))
+    sobol = qmc.Sobol(len(box), seed=0)  # pyright: ignore[reportCallIssue]  # rng from scipy 1.15
+    spread = qmc.scale(sobol.random_base2(4), *np.transpose(box))
     return [today, *(tuple(point) for point in spread[: SOBOL - 1].tolist())]
 
 
