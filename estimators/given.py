@@ -51,3 +51,35 @@ def given_by(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> Gi
     inputs = np.zeros((len(drive), len(twin.inputs)))
     inputs[:, [twin.inputs.index(name) for name in torqueless]] = drive.inputs
     return Given(inputs, measurements, speed)
+
+
+def check_drive(drive: Drive, twin: BlackBox) -> None:
+    """Refuses a drive that does not fit a twin.
+
+    Raises:
+        TwinError: other channels or another sample time than the twin, or infinite measurements.
+    """
+    if (drive.input_names, drive.output_names) != (twin.inputs, twin.outputs):
+        raise TwinError(
+            f"drive: has channels {drive.input_names + drive.output_names}, the twin needs "
+            f"{twin.inputs + twin.outputs} in this order"
+        )
+    if abs(drive.dt - twin.dt) > 1e-9:
+        raise TwinError(f"drive: has samples every {drive.dt} s, the twin steps {twin.dt} s")
+    check_measurements(drive.measurements, twin.outputs, "drive")
+
+
+def check_measurements(y: Array, names: tuple[str, ...], what: str) -> None:
+    """Refuses measurements (n, ny) that are infinite; NaN is no measurement.
+
+    Raises:
+        TwinError: as said, or another shape.
+    """
+    if y.shape[1:] != (len(names),):
+        raise TwinError(f"{what}: measurements have shape {y.shape}; allowed: (n, {len(names)})")
+    if np.isinf(y).any():
+        row, column = np.argwhere(np.isinf(y))[0]
+        raise TwinError(
+            f"{what}: {names[column]} is {y[row, column]} in sample {row}; allowed: finite "
+            "numbers, and NaN where there is no measurement"
+        )

@@ -3,16 +3,29 @@
 See `estimators.joint_kernel` for the method, and `JointSettings` for what can be chosen.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators import joint_kernel
 from estimators.estimate import Estimate
-from estimators.joint_kernel import RING, Log, Memory, Setup
-from twin import OUTPUTS, PARAMETERS, SCALES, Drive, Fleet, Snapshot, TwinError, Vehicle, check_inputs
+from estimators.joint_memory import RING, Log, Memory, Setup
+from estimators.given import check_drive, check_measurements
+from twin import (
+    LOAD,
+    OUTPUTS,
+    PARAMETERS,
+    SCALES,
+    Drive,
+    Fleet,
+    Snapshot,
+    TwinError,
+    Vehicle,
+    check_inputs,
+)
 
 Array = NDArray[np.float64]
 
@@ -56,6 +69,13 @@ class JointSettings:
             linearisation leaves out.
         doubt: by which it is first taken larger besides, until innovations prove to be white.
         doubt_memory: how fast that is seen [s].
+        watch: seconds of driving after a standstill in which a change of the load is looked for.
+        settle: seconds of driving before the first standstill at which the load can change.
+        change_memory: how far back what contradicts the load is looked at [s].
+        surprise: least statistic of a change: chi-square, one degree of freedom for each parameter
+            of the load, as long as there is none and the model is right.
+        least_change: of some parameter of the load, in its prior sd; less is no change of load.
+        valid_share: of its prior sd that an estimate's sd has to be below to count as valid.
         drift: share of its prior sd that a parameter may wander over a second.
         step: largest share of its prior sd by which an estimate moves in a block.
         hold_off: seconds before the first correction.
@@ -71,7 +91,13 @@ class JointSettings:
     noise_factor: float = 1.0
     doubt: float = 3.0
     doubt_memory: float = 10.0
-    drift: float = 0.001
+    watch: float = 20.0
+    settle: float = 5.0
+    change_memory: float = 2.0
+    surprise: float = 200.0
+    least_change: float = 0.15
+    valid_share: float = 0.2
+    drift: float = 0.0003
     step: float = 0.1
     hold_off: float = 1.0
     block: int = 10
@@ -85,17 +111,31 @@ class JointEstimate(Estimate):
 
     Attributes:
         estimated: p names of what was estimated, in the order of `covariance`; faults follow.
+        prior: (p + b,) standard deviations before the first sample.
         sd: (N, p + b) standard deviation of each estimate.
+        valid: (N, p + b) whether the drive has told it.
+        changes: (N,) of the load that were found until then.
         faults: (N, b) of the sensors, in the order of `JointSettings.faults`.
         covariance: (p + b, p + b) at the end.
         information: (p + b, p + b) Fisher's, of all that was used.
     """
 
     estimated: tuple[str, ...]
+    fault_names: tuple[str, ...]
+    prior: Array
     sd: Array
+    valid: NDArray[np.bool_]
+    changes: NDArray[np.int64]
     faults: Array
     covariance: Array
     information: Array
+
+
+class JointSnapshot(NamedTuple):
+    """Everything that decides a joint observer's future."""
+
+    twins: tuple[Snapshot, ...]
+    memory: Memory
 
 
 class JointObserver:
@@ -111,7 +151,10 @@ class JointObserver:
     """
 
     def __init__(
-        self, vehicle: Vehicle, noise_sd: ArrayLike, settings: JointSettings = JointSettings()  # noqa: B008
+        self,
+        vehicle: Vehicle,
+        noise_sd: ArrayLike,
+        settings: JointSettings = JointSettings(),
     ) -> None:
         self.settings = settings
         names = settings.parameters
@@ -125,7 +168,7 @@ class JointObserver:
         first = self.fleet.twins[0]
         self.dt = first.dt
         self._setup = Setup(
-            index=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
+            parameter=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             offset=np.array([OFFSETS[name] for name in names]),
             fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
             step_limit=settings.step * self._prior,
@@ -140,6 +183,13 @@ class JointObserver:
             memory=1.0,
             doubt=settings.doubt,
             doubt_memory=settings.doubt_memory,
+            prior=self._prior.copy(),
+            load=np.array([i for i, n in enumerate(names) if n in LOAD], dtype=np.int64),
+            watch=round(settings.watch / (settings.block * self.dt)),
+            settle=round(settings.settle / (settings.block * self.dt)),
+            change_memory=settings.change_memory,
+            surprise=settings.surprise,
+            least_change=settings.least_change,
             dt=self.dt,
         )
         n, p, q = len(self.fleet), len(PARAMETERS), self._prior.size
@@ -147,11 +197,14 @@ class JointObserver:
         self._memory = Memory(
             theta=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
-            count=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
-            excitation=np.zeros((2, 4)), innovation=np.zeros(ny), expected=np.zeros(ny),
+            present=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
+            excitation=np.zeros((2, 4)),
             information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
             ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
             doubt=np.zeros(ny), window=np.zeros((3, ny)), window_h=np.zeros((ny, q)),
+            recent=np.zeros((q, q)), score=np.zeros(q), kept=np.zeros(q),
+            kept_covariance=np.zeros((q, q)), kept_doubt=np.zeros(ny),
+            blocks=np.zeros(2, dtype=np.int64), changes=np.zeros(1, dtype=np.int64),
         )  # fmt: skip
         self.reset(0.0)
 
@@ -177,15 +230,62 @@ class JointObserver:
                     f"joint: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
                 )
             memory.theta[PARAMETERS.index(name)] = value
-        memory.z[: self._setup.index.size] = memory.theta[self._setup.index]
+        memory.z[: self._setup.parameter.size] = memory.theta[self._setup.parameter]
         memory.covariance[:] = np.diag(self._prior**2)
         memory.doubt[:] = self.settings.doubt
         for i, twin in enumerate(self.fleet.twins):
             p = memory.theta.copy()
             if i > 0:
-                p[self._setup.index[i - 1]] += self._setup.offset[i - 1]
+                p[self._setup.parameter[i - 1]] += self._setup.offset[i - 1]
             twin.set_parameters(p)
             twin.reset(speed, road)
+
+    @property
+    def covariance(self) -> Array:
+        """(p + b, p + b) of `estimated`, now."""
+        return self._memory.covariance.copy()
+
+    def update(self, u: ArrayLike, y: ArrayLike) -> Array:
+        """Takes one sample of inputs (13,) and measurements (10,); returns the parameters (15,).
+
+        Raises:
+            TwinError: a value is not finite or out of range, or a twin has blown up.
+        """
+        u = np.ascontiguousarray(u, dtype=np.float64)
+        y = np.ascontiguousarray(y, dtype=np.float64)
+        check_inputs(u[None], "update")
+        check_measurements(y[None], OUTPUTS, "update")
+        joint_kernel.update(self.fleet.cars, self._setup, self._memory, u, y)
+        for twin in self.fleet.twins:
+            twin.check()
+        return self._memory.theta.copy()
+
+    def snapshot(self) -> JointSnapshot:
+        """Everything that decides the future; a run from it is bit-exact."""
+        return JointSnapshot(
+            tuple(twin.snapshot() for twin in self.fleet.twins),
+            self._memory._replace(
+                **{name: array.copy() for name, array in self._memory._asdict().items()}
+            ),
+        )
+
+    def restore(self, snapshot: JointSnapshot) -> None:
+        """Goes back to a snapshot of an observer with the same settings and vehicle.
+
+        Raises:
+            TwinError: it estimates something else.
+        """
+        if snapshot.memory.out.shape != self._memory.out.shape or (
+            snapshot.memory.z.shape != self._memory.z.shape
+        ):
+            raise TwinError(
+                f"joint: the snapshot has {snapshot.memory.z.size} estimates of "
+                f"{len(snapshot.twins)} twins; allowed: {self._memory.z.size} of {len(self.fleet)}"
+            )
+        for twin, kept in zip(self.fleet.twins, snapshot.twins, strict=True):
+            twin.restore(kept)
+        for array, kept in zip(self._memory, snapshot.memory, strict=True):
+            array[:] = kept
 
     def run(self, drive: Drive) -> JointEstimate:
         """Observes a whole drive, from the state that the observer is in.
@@ -193,15 +293,18 @@ class JointObserver:
         Raises:
             TwinError: the drive does not fit the twins, or a twin has blown up.
         """
+        twin = self.fleet.twins[0]
+        check_drive(drive, twin)
         check_inputs(drive.inputs, "drive")
-        n, twin, q = len(drive), self.fleet.twins[0], self._prior.size
+        n, q = len(drive), self._prior.size
         log = Log(
             states=np.empty((n, len(twin.states))),
             parameters=np.empty((n, len(PARAMETERS))),
             outputs=np.empty((n, len(OUTPUTS))),
             extended=np.empty((n, *twin.car.tyre_output.shape)),
             sd=np.empty((n, q)),
-            faults=np.empty((n, q - self._setup.index.size)),
+            faults=np.empty((n, q - self._setup.parameter.size)),
+            changes=np.empty(n, dtype=np.int64),
         )
         done = joint_kernel.run(
             self.fleet.cars, self._setup, self._memory, drive.inputs, drive.measurements, log
@@ -216,7 +319,11 @@ class JointObserver:
             extended=log.extended.reshape(n, -1),
             nominal=self._setup.nominal.copy(),
             estimated=self.estimated,
+            fault_names=self.settings.faults,
+            prior=self._prior.copy(),
             sd=log.sd,
+            valid=log.sd < self.settings.valid_share * self._prior,
+            changes=log.changes,
             faults=log.faults,
             covariance=self._memory.covariance.copy(),
             information=self._memory.information.copy(),
@@ -227,8 +334,13 @@ def _check(settings: JointSettings, noise_sd: Array) -> None:
     unknown = [name for name in settings.parameters if name not in PARAMETERS]
     if unknown or len(set(settings.parameters)) < len(settings.parameters):
         raise TwinError(
-            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once of "
-            f"{', '.join(PARAMETERS)}"
+            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once "
+            f"of {', '.join(PARAMETERS)}"
+        )
+    if not set(settings.faults) <= set(FAULTS) or len(set(settings.faults)) < len(settings.faults):
+        raise TwinError(
+            f"joint: faults are {', '.join(settings.faults)}; allowed: each at most once of "
+            f"{', '.join(FAULTS)}"
         )
     if noise_sd.shape != (len(OUTPUTS),) or not (np.isnan(noise_sd) | (noise_sd > 0.0)).all():
         raise TwinError(

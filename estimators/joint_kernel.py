@@ -7,81 +7,35 @@ parameters each twin's states move by S d, to where they would be had the parame
 these. Without that each step would ring the springs and the sensitivities would lie.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from estimators.joint_doubt import forget_load, keep, load_changed, weigh
+from estimators.joint_memory import (
+    ABSENT,
+    ANGLE,
+    BLOCKS,
+    DELAY,
+    DRIVEN,
+    EXCITING,
+    IMU,
+    LEAST_SPIN,
+    NX,
+    NY,
+    PITCH,
+    POSITION,
+    RING,
+    ROLL,
+    ROLL_RATE,
+    SAMPLES,
+    SPIN,
+    TOTAL,
+    VX,
+    WATCH,
+    WHEEL_SPEED,
+)
 from estimators.rigid_body import project
-from twin import OUTPUTS, STATES
 from twin.kernel import correct, is_sound, read_states, set_parameters, step
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
-IMU, NY, NX = 6, len(OUTPUTS), len(STATES)
-WHEEL_SPEED = OUTPUTS.index("wheel_speed_fl")
-ROLL, PITCH, VX, SPIN = (STATES.index(n) for n in ("roll", "pitch", "vx", "wheel_speed_fl"))
-TRAVEL, ANGLE = STATES.index("suspension_travel_fl"), STATES.index("wheel_angle_fl")
-AX, AY, ROLL_RATE, PITCH_RATE = (OUTPUTS.index(n) for n in ("ax", "ay", "roll_rate", "pitch_rate"))
-EXCITING = np.array([AX, AY, ROLL_RATE, PITCH_RATE])
-ABSENT = 1e12  # variance of a channel that has no measurement
-# Slower than this a wheel speed tells no speed of the car [rad/s]; chosen
-LEAST_SPIN = 1.0
-SAMPLES, BLOCKS, TOTAL = 0, 1, 2  # what the clock counts: of the block, blocks, of all
-# What is estimated of the sensors besides parameters: biases, delay, and the place of the IMU
-DELAY, POSITION = IMU, IMU + 1
-RING = 64  # samples: the longest delay
-LARGEST_DOUBT = 1e3  # of one window
-WINDOW = 16  # blocks over which innovations are summed to see whether they are white
-
-
-class Setup(NamedTuple):
-    """What does not change: p parameters, q estimates (parameters, then faults of sensors)."""
-
-    index: Indices  # (p,) of each parameter among the twin's
-    offset: Array  # (p,) of its twin
-    fault: Indices  # (q - p,) of the sensors: channel of a bias, DELAY, POSITION + axis
-    step_limit: Array  # (q,) the most an estimate may move in a block
-    drift: Array  # (q,) variance per second
-    noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
-    nominal: Array  # (np,) the unloaded chassis
-    block: int  # samples
-    hold_off: int  # blocks before the first correction
-    speed_gain: float  # of the twins' speeds [1/s]
-    least_excitation: float  # [m2/s4]
-    rate_weight: float  # of a roll or pitch rate in it [m2/s2]
-    memory: float  # of excitation [s]
-    doubt: float  # first factor of the noise's variance, before innovations prove it white
-    doubt_memory: float  # [s]
-    dt: float  # of a sample [s]
-
-
-class Memory(NamedTuple):
-    """What the observer keeps from sample to sample, beside its twins."""
-
-    theta: Array  # (np,) parameters of twin 0
-    z: Array  # (q,) estimates
-    covariance: Array  # (q, q)
-    out: Array  # (n, ny) the twins' last outputs
-    total: Array  # (n, ny) their sum over the block
-    measured: Array  # (ny,) the measurements' sum
-    count: Array  # (ny,) of measurements
-    states: Array  # (n, nx)
-    dx: Array  # (nx,)
-    p: Array  # (np,) what is set
-    excitation: Array  # (2, 4) means and squares of what excites
-    innovation: Array  # (ny,) of the last block
-    expected: Array  # (ny,) its variance
-    information: Array  # (q, q) of what was used
-    ring: Array  # (RING, n, ny) the twins' last outputs
-    late: Array  # (n, ny) the twins' outputs of the delay ago
-    edge: Array  # (ny,) of twin 0 at the end of the block before
-    doubt: Array  # (ny,) factor of each channel's variance that its innovations show
-    window: Array  # (3, ny) sums of innovations, of their variance; number of blocks
-    window_h: Array  # (ny, q) sums of sensitivities
-    clock: Indices  # (3,)
 
 
 @njit(cache=True, nogil=True)
@@ -96,7 +50,7 @@ def update(cars, setup, memory, u, y):
     for j in range(NY):
         if not np.isnan(y[j]):
             memory.measured[j] += y[j]
-            memory.count[j] += 1.0
+            memory.present[j] += 1.0
     memory.clock[SAMPLES] += 1
     if memory.clock[SAMPLES] < setup.block:
         return
@@ -106,7 +60,7 @@ def update(cars, setup, memory, u, y):
     _follow_speed(cars, setup, memory)
     memory.total[:] = 0.0
     memory.measured[:] = 0.0
-    memory.count[:] = 0.0
+    memory.present[:] = 0.0
     memory.edge[:] = memory.late[0]
 
 
@@ -116,7 +70,7 @@ def _delay(setup, memory):
     k, late = memory.clock[TOTAL], 0.0
     for i in range(setup.fault.size):
         if setup.fault[i] == DELAY:
-            late = memory.z[setup.index.size + i] / setup.dt
+            late = memory.z[setup.parameter.size + i] / setup.dt
     memory.ring[k % RING] = memory.out
     whole = min(max(int(np.floor(late)), 0), RING - 2)
     part = late - whole  # below zero it extrapolates
@@ -134,7 +88,7 @@ def _delay(setup, memory):
 @njit(cache=True, nogil=True)
 def _sensitivity(setup, memory):
     """(ny, q) of the block's mean outputs."""
-    p, q = setup.index.size, memory.z.size
+    p, q = setup.parameter.size, memory.z.size
     h = np.zeros((NY, q))
     for i in range(p):
         for j in range(NY):
@@ -170,11 +124,11 @@ def _innovation(setup, memory, h):
     """The block's mean innovation (ny,) and the variance of its noise (ny,)."""
     r, variance = np.zeros(NY), np.full(NY, ABSENT)
     for j in range(NY):
-        if memory.count[j] > 0.0 and not np.isnan(setup.noise[j]):
-            r[j] = memory.measured[j] / memory.count[j] - memory.total[0, j] / setup.block
-            variance[j] = setup.noise[j] / memory.count[j]
-    for i in range(setup.index.size, memory.z.size):
-        if setup.fault[i - setup.index.size] != DELAY:  # which is in the outputs already
+        if memory.present[j] > 0.0 and not np.isnan(setup.noise[j]):
+            r[j] = memory.measured[j] / memory.present[j] - memory.total[0, j] / setup.block
+            variance[j] = setup.noise[j] / memory.present[j]
+    for i in range(setup.parameter.size, memory.z.size):
+        if setup.fault[i - setup.parameter.size] != DELAY:  # which is in the outputs already
             for j in range(IMU):
                 if variance[j] < ABSENT:
                     r[j] -= h[j, i] * memory.z[i]
@@ -195,34 +149,8 @@ def _is_excited(setup, memory):
         square[k] += share * (value**2 - square[k])
         weight = 1.0 if EXCITING[k] < ROLL_RATE else setup.rate_weight
         total += weight * (square[k] - mean[k] ** 2)
-    return total >= setup.least_excitation
-
-
-@njit(cache=True, nogil=True)
-def _weigh(setup, memory, h, r, variance):
-    """Scales the variances by what sums of innovations show of noise that is not white.
-
-    A sum over a window has the variance of white noise and of what the parameters are not known
-    by; what exceeds it is coloured noise or an error of the model, and counts as noise.
-    """
-    window, summed = memory.window, memory.window_h
-    for j in range(NY):
-        if variance[j] < ABSENT:
-            window[0, j] += r[j]
-            window[1, j] += variance[j]
-            summed[j] += h[j]
-            variance[j] *= max(memory.doubt[j], 1.0)
-    window[2] += 1.0
-    if window[2, 0] < WINDOW:
-        return
-    share = WINDOW * setup.block * setup.dt / setup.doubt_memory
-    for j in range(NY):
-        if window[1, j] > 0.0:
-            known = summed[j] @ (memory.covariance @ summed[j])
-            excess = (window[0, j] ** 2 - known) / window[1, j]
-            memory.doubt[j] += share * (min(max(excess, 0.0), LARGEST_DOUBT) - memory.doubt[j])
-    window[:] = 0.0
-    summed[:] = 0.0
+    spin = min(memory.total[0, WHEEL_SPEED:].min() / setup.block, memory.late[:, -1].min())
+    return total >= setup.least_excitation and spin >= LEAST_SPIN
 
 
 @njit(cache=True, nogil=True)
@@ -230,16 +158,23 @@ def _estimate(cars, setup, memory):
     """A Kalman step on the parameters, and the twins' states with them."""
     h = _sensitivity(setup, memory)
     r, variance = _innovation(setup, memory, h)
-    _weigh(setup, memory, h, r, variance)
+    weigh(setup, memory, h, r, variance)
     q, covariance = memory.z.size, memory.covariance
     seconds = setup.block * setup.dt
-    hp = h @ covariance
-    s = hp @ h.T
-    for j in range(NY):
-        s[j, j] += variance[j]
-        memory.innovation[j], memory.expected[j] = r[j], s[j, j]
     excited = _is_excited(setup, memory)
     if excited and memory.clock[BLOCKS] > setup.hold_off:
+        memory.blocks[DRIVEN] += 1
+        if memory.blocks[WATCH] > 0:
+            memory.blocks[WATCH] -= 1
+            if load_changed(setup, memory, h, r):
+                before = memory.z.copy()
+                forget_load(setup, memory)
+                _move(cars, setup, memory, memory.z - before)
+                return
+        hp = h @ covariance
+        s = hp @ h.T
+        for j in range(NY):
+            s[j, j] += variance[j]
         gain = np.ascontiguousarray(np.linalg.solve(s, hp).T)
         move = gain @ r
         share = 1.0
@@ -257,11 +192,13 @@ def _estimate(cars, setup, memory):
         memory.information[:] += h.T @ informed
         before = memory.z.copy()
         memory.z[:] += share * move
-        for i in range(setup.index.size, q):
-            if setup.fault[i - setup.index.size] == DELAY:
+        for i in range(setup.parameter.size, q):
+            if setup.fault[i - setup.parameter.size] == DELAY:
                 memory.z[i] = min(max(memory.z[i], -setup.dt), (RING - 2) * setup.dt)
-        project(memory.z, covariance, setup.index, setup.nominal, memory.theta)
+        project(memory.z, covariance, setup.parameter, setup.nominal, memory.theta)
         _move(cars, setup, memory, memory.z - before)
+    else:
+        keep(setup, memory)
     for i in range(q):
         covariance[i, i] += setup.drift[i] * seconds
 
@@ -269,7 +206,7 @@ def _estimate(cars, setup, memory):
 @njit(cache=True, nogil=True)
 def _move(cars, setup, memory, d):
     """Steps the parameters by d (q,) and every twin's states by S d."""
-    n, p = cars.size, setup.index.size
+    n, p = cars.size, setup.parameter.size
     states, dx, theta = memory.states, memory.dx, memory.theta
     for i in range(n):
         read_states(cars[i], states[i])
@@ -284,12 +221,12 @@ def _move(cars, setup, memory, d):
     dx[ROLL] = roll
     dx[ANGLE : ANGLE + 4] = 0.0
     for i in range(p):
-        theta[setup.index[i]] = memory.z[i]
+        theta[setup.parameter[i]] = memory.z[i]
     for i in range(n):
         correct(cars[i], dx)
         memory.p[:] = theta
         if i > 0:
-            memory.p[setup.index[i - 1]] += setup.offset[i - 1]
+            memory.p[setup.parameter[i - 1]] += setup.offset[i - 1]
         set_parameters(cars[i], memory.p)
 
 
@@ -302,9 +239,9 @@ def _follow_speed(cars, setup, memory):
     for i in range(cars.size):
         late, spin, n = 0.0, 0.0, 0
         for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
-            if memory.count[j] > 0.0:
+            if memory.present[j] > 0.0:
                 mean = memory.total[i, j] / setup.block
-                late += memory.measured[j] / memory.count[j] - mean
+                late += memory.measured[j] / memory.present[j] - mean
                 spin += mean
                 n += 1
         if n == 0 or spin < n * LEAST_SPIN:
@@ -320,7 +257,7 @@ def _follow_speed(cars, setup, memory):
 @njit(cache=True, nogil=True)
 def run(cars, setup, memory, inputs, measurements, log):
     """All samples of a drive; returns how many were sound."""
-    p = setup.index.size
+    p = setup.parameter.size
     for k in range(inputs.shape[0]):
         read_states(cars[0], log.states[k])
         update(cars, setup, memory, inputs[k], measurements[k])
@@ -330,18 +267,8 @@ def run(cars, setup, memory, inputs, measurements, log):
         for i in range(memory.z.size):
             log.sd[k, i] = np.sqrt(memory.covariance[i, i])
         log.faults[k] = memory.z[p:]
+        log.changes[k] = memory.changes[0]
         for i in range(cars.size):
             if not is_sound(cars[i]):
                 return k
     return inputs.shape[0]
-
-
-class Log(NamedTuple):
-    """Histories of N samples, to be filled."""
-
-    states: Array  # (N, nx)
-    parameters: Array  # (N, np)
-    outputs: Array  # (N, ny)
-    extended: Array  # (N, 4, 9)
-    sd: Array  # (N, q)
-    faults: Array  # (N, q - p)

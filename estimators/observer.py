@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimators.black_box import BlackBox
 from estimators.estimate import Estimate
 from estimators.gains import compile_gains, place_of
-from estimators.given import Given, given_by
+from estimators.given import Given, check_measurements, given_by
 from estimators.guard import LARGEST, REJECTED, SETTLING, guard, new_watch, renew
 from estimators.law import BEGUN, JUMPED, LEAST_SQUARES, PP, ParameterLaw, advance_law, compile_laws
 from estimators.speed_follower import SpeedFollower, check_follower, follow
@@ -169,7 +169,7 @@ class Observer:
         """
         self._memory.u[:] = u
         y = np.ascontiguousarray(y, dtype=np.float64)
-        self._check_measurements(y[None], "update")
+        self._check(y[None], "update")
         if isinstance(self.twin, Twin):
             check_inputs(self._memory.u[None], "update")
             _update(self.twin.car, self._gains, self._laws, self._memory, y, self._every)
@@ -193,7 +193,7 @@ class Observer:
                 f"drive: has samples every {drive.dt} s, the twin steps {self.twin.dt} s"
             )
         given = given_by(drive, self.twin, self._follower)
-        self._check_measurements(given.measurements, "drive")
+        self._check(given.measurements, "drive")
         for name in () if self.guarded else self._needed:
             if np.isnan(drive.channel(name)).all():
                 raise TwinError(f"drive: has no measurement of {name}, which a law needs")
@@ -252,18 +252,10 @@ class Observer:
             trustworthy=trustworthy,
         )
 
-    def _check_measurements(self, y: Array, what: str) -> None:
-        names = self.twin.outputs
-        if y.shape[1:] != (len(names),):
-            raise TwinError(
-                f"{what}: measurements have shape {y.shape}; allowed: (n, {len(names)})"
-            )
-        if np.isinf(y).any() and not self.guarded:
-            row, column = np.argwhere(np.isinf(y))[0]
-            raise TwinError(
-                f"{what}: {names[column]} is {y[row, column]} in sample {row}; allowed: finite "
-                "numbers, and NaN where there is no measurement"
-            )
+    def _check(self, y: Array, what: str) -> None:
+        """Refuses measurements of another shape, and infinite ones unless a guard rejects them."""
+        finite = np.where(np.isinf(y), np.nan, y) if self.guarded else y
+        check_measurements(finite, self.twin.outputs, what)
 
     def _update_black_box(self, y: Array) -> None:
         """`_update`, its simulator called from Python."""

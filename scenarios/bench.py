@@ -7,13 +7,14 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from estimators.joint import JointObserver, JointSettings
 from estimators.observer import Observer
 from scenarios.manoeuvres import urban
 from scenarios.mass import STUDY
 from scenarios.progress import progress
 from scenarios.record import record
 from scenarios.result import Result, Row
-from twin import Drive, Twin, Vehicle, with_noise
+from twin import LOAD, Drive, Twin, Vehicle, with_noise
 
 BLOCK = 5.0  # [s] of driving per measurement of what is compared
 PAIRS = 30
@@ -32,6 +33,7 @@ def run() -> Result:
     rows = [
         _row("closed_loop_ratio", "1", _closed_loop_ratio(_part(drive, 10.0, BLOCK))),
         _row("real_time_factor", "1", _real_time_factor(drive)),
+        _row("joint_realtime_factor", "1", _joint_real_time_factor(_part(drive, 10.0, BLOCK))),
         _row("step_latency_p999_us", "us", _latency(drive)),
         _row("thread_speedup_2", "1", _thread_speedup(_part(drive, 10.0, BLOCK))),
     ]
@@ -96,6 +98,17 @@ def _real_time_factor(drive: Drive) -> list[float]:
         observer.reset(0.0)
         factors.append((len(drive) * drive.dt) / _seconds(lambda: observer.run(drive)))
     return factors
+
+
+def _joint_real_time_factor(drive: Drive) -> list[float]:
+    """The same of the joint observer of the seven parameters of a load: eight twins, one core."""
+    sd = [drive.settings["noise_sd"][name] for name in drive.output_names]
+    observer = JointObserver(Vehicle.load("suv"), sd, JointSettings(parameters=LOAD[:7]))
+    factors = []
+    for _ in progress(range(4), "joint"):
+        observer.reset(float(drive.truth["vx"][0]))
+        factors.append((len(drive) * drive.dt) / _seconds(lambda: observer.run(drive)))
+    return factors[1:]
 
 
 def _latency(drive: Drive) -> list[float]:

@@ -140,6 +140,14 @@ SCENARIOS = {
     "lane-change": Entry(
         "scenarios.laps:LANE_CHANGE", "double lane changes and braking: sideslip and mass"
     ),
+    "mixed": Entry(
+        "scenarios.joint:MIXED", "two brisk minutes: all load parameters, tyres and springs at once"
+    ),
+    "hard": Entry("scenarios.joint:HARD", "near the limit: the same, and the friction"),
+    "straight": Entry("scenarios.joint:STRAIGHT", "steady straight on: a drive that tells nothing"),
+    "load-change": Entry(
+        "scenarios.joint:LOAD_CHANGES", "two passengers get out at a stop, and the load is followed"
+    ),
     "truck": Entry(
         f"{_TRUCK}:SCENARIO", "a truck's load changes twice: Kalman-Bucy filters beside TiL"
     ),
@@ -149,6 +157,7 @@ SCENARIOS = {
 }
 
 _STATES = "scenarios.state_figures"
+_JOINT = "scenarios.joint_tables"
 _TABLES, _FIGURES = "scenarios.til_tables", "scenarios.til_figures"
 REPRODUCTIONS = {
     "til-table-3": Entry(f"{_TABLES}:table_3", "load parameters of the empty and loaded car"),
@@ -179,6 +188,7 @@ REPRODUCTIONS = {
     "til-double-track-ramp": Entry(
         f"{_STATES}:ramp", "the double track's mass is a ramp: three initial errors"
     ),
+    "til-joint-all": Entry(f"{_JOINT}:everything", "all drives, all real vehicles: joint observer"),
     "kbf-table-2": Entry(f"{_TRUCK}_studies:table_2", "every filter in both readings of the noise"),
     "kbf-figure-5": Entry(f"{_TRUCK}_figures:figure_5", "the truck's velocities over time"),
     "kbf-figure-6": Entry(f"{_TRUCK}_figures:figure_6", "the truck's mass and inertia over time"),

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.record import Manoeuvre
+from scenarios.record import Manoeuvre, record
+from twin import Drive, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -25,9 +26,7 @@ def _ramps(parts: list[tuple[float, float]], n: int, dt: float) -> Array:
     return speed
 
 
-def rough_patches(
-    distance: Array, starts: Array, length: float, sd: float, seed: int
-) -> Array:
+def rough_patches(distance: Array, starts: Array, length: float, sd: float, seed: int) -> Array:
     """(N, 4) road heights [m] under the wheels, rough on patches and flat between them.
 
     Left and right are independent, the rear wheels follow in the track of the front ones. The
@@ -84,3 +83,77 @@ def mixed(dt: float = DT, duration: float | None = None) -> Manoeuvre:
     distance = np.cumsum(speed) * dt
     road = rough_patches(distance, np.arange(15.0, 3000.0, 110.0), 90.0, 0.010, seed=11)
     return Manoeuvre(name="mixed", dt=dt, speed=speed, steering=steering, road=road)
+
+
+def hard(dt: float = DT, duration: float | None = None) -> Manoeuvre:
+    """A minute near the limit: full braking from 25 m/s, then bends of some 0.8 g."""
+    n = round((duration or 60.0) / dt)
+    time = np.arange(n) * dt
+    speed = _ramps([(1.0, 14.0), *[(4.5, 25.0), (2.6, 9.0), (2.9, 14.0)] * 8], n, dt)
+    phase = (time - 1.0) % 10.0
+    turning = np.sin(np.pi * np.clip((phase - 6.2) / 3.4, 0.0, 1.0)) ** 2
+    left = np.where((time - 1.0) % 20.0 < 10.0, 1.0, -1.0)
+    slalom = 0.4 * np.sin(2.0 * np.pi * 1.3 * time) * (1.0 - turning)
+    return Manoeuvre(
+        name="hard",
+        dt=dt,
+        speed=speed,
+        steering=np.clip(time, 0.0, 1.0) * (2.6 * left * turning + slalom),
+        road=np.zeros((n, 4)),
+    )
+
+
+def straight(dt: float = DT, duration: float | None = None) -> Manoeuvre:
+    """A minute straight on at 20 m/s on a level road: it tells nothing."""
+    n = round((duration or 60.0) / dt)
+    return Manoeuvre(
+        name="straight",
+        dt=dt,
+        speed=np.full(n, 20.0),
+        steering=np.zeros(n),
+        road=np.zeros((n, 4)),
+    )
+
+
+def half_of_a_trip(dt: float = DT, duration: float | None = None) -> Manoeuvre:
+    """Forty seconds like `mixed`, from a standstill to a standstill."""
+    whole = duration or 40.0
+    n = round(whole / dt)
+    time = np.arange(n) * dt
+    driving = whole - 9.0
+    middle = mixed(dt, driving)
+    speed = np.concatenate(
+        [
+            _ramps([(1.5, 0.0), (3.5, middle.speed[0])], round(5.0 / dt), dt) * 1.0,
+            middle.speed,
+            np.zeros(n - round(5.0 / dt) - middle.speed.size),
+        ]
+    )
+    start = round(5.0 / dt)
+    speed[:start] = np.where(time[:start] < 1.5, 0.0, speed[:start])
+    braking = slice(start + middle.speed.size, n)
+    left = np.clip(1.0 - (time[braking] - time[braking][0]) / 2.4, 0.0, 1.0)
+    speed[braking] = middle.speed[-1] * left
+    steering = np.zeros(n)
+    steering[start : start + middle.speed.size] = middle.steering
+    steering[braking] = middle.steering[-1] * left
+    return Manoeuvre(
+        name="half of a trip", dt=dt, speed=speed, steering=steering, road=np.zeros((n, 4))
+    )
+
+
+def load_change(before: Vehicle, after: Vehicle) -> Drive:
+    """Two halves of a trip; what is on board changes while the car stands between them.
+
+    The halves are recorded one after the other, each from a settled standstill: that the body rises
+    as somebody gets out is not shown, that it has risen is.
+    """
+    halves = [record(vehicle, half_of_a_trip()) for vehicle in (before, after)]
+    first, second = halves
+    return first.replace(
+        time=np.arange(len(first) + len(second)) * first.dt,
+        inputs=np.concatenate([half.inputs for half in halves]),
+        measurements=np.concatenate([half.measurements for half in halves]),
+        truth={name: np.concatenate([half.truth[name] for half in halves]) for name in first.truth},
+        settings=first.settings | {"manoeuvre": "load change"},
+    )

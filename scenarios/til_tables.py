@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios import mass, pitch, roll_yaw
+from scenarios import joint_tables, mass, pitch, roll_yaw
 from scenarios.result import Result, Row
 from scenarios.study import REAL, TWIN, Study, rows
 from twin import Vehicle
@@ -46,18 +46,20 @@ def table_4(seeds: int, jobs: int, out: Path) -> Result:
 
 
 def table_5(seeds: int, jobs: int, out: Path) -> Result:
-    """Roll and yaw inertia."""
-    return _table("til-table-5", roll_yaw.STUDY, seeds, jobs)
+    """Roll and yaw inertia, also by the joint observer."""
+    return _table("til-table-5", roll_yaw.STUDY, seeds, jobs, joint=True)
 
 
 def table_6(seeds: int, jobs: int, out: Path) -> Result:
-    """Pitch inertia."""
-    return _table("til-table-6", pitch.STUDY, seeds, jobs)
+    """Pitch inertia, also by the joint observer."""
+    return _table("til-table-6", pitch.STUDY, seeds, jobs, joint=True)
 
 
-def _table(name: str, study: Study, seeds: int, jobs: int) -> Result:
+def _table(name: str, study: Study, seeds: int, jobs: int, *, joint: bool = False) -> Result:
     start = time.perf_counter()
     found = rows(study, study.cases, range(seeds), jobs)
+    if joint:
+        found += joint_tables.rows(study, study.cases, range(seeds), jobs)
     return Result(
         name=name,
         settings={"seeds": seeds},

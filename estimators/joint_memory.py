@@ -1,0 +1,102 @@
+"""What the compiled joint observer works on."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin import OUTPUTS, STATES
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+IMU, NY, NX = 6, len(OUTPUTS), len(STATES)
+WHEEL_SPEED = OUTPUTS.index("wheel_speed_fl")
+ROLL, PITCH, VX, SPIN = (STATES.index(n) for n in ("roll", "pitch", "vx", "wheel_speed_fl"))
+ANGLE = STATES.index("wheel_angle_fl")
+AX, AY, ROLL_RATE, PITCH_RATE = (OUTPUTS.index(n) for n in ("ax", "ay", "roll_rate", "pitch_rate"))
+EXCITING = np.array([AX, AY, ROLL_RATE, PITCH_RATE])
+ABSENT = 1e12  # variance of a channel that has no measurement
+# Wheels slower than this [rad/s], 1 m/s, tell nothing: the instant of a stop is a jump
+LEAST_SPIN = 3.0
+STANDING = 0.5  # and slower than this the car stands; chosen
+WATCH, DRIVEN = 0, 1  # blocks: left to look for a change of the load; of exciting driving so far
+SAMPLES, BLOCKS, TOTAL = 0, 1, 2  # what the clock counts: of the block, blocks, of all
+# What is estimated of the sensors besides parameters: biases, delay, and the place of the IMU
+DELAY, POSITION = IMU, IMU + 1
+RING = 64  # samples: the longest delay
+LARGEST_DOUBT = 1e3  # of one window
+WINDOW = 16  # blocks over which innovations are summed to see whether they are white
+
+
+class Setup(NamedTuple):
+    """What does not change: p parameters, q estimates (parameters, then faults of sensors)."""
+
+    parameter: Indices  # (p,) of each among the twin's
+    offset: Array  # (p,) of its twin
+    fault: Indices  # (q - p,) of the sensors: channel of a bias, DELAY, POSITION + axis
+    step_limit: Array  # (q,) the most an estimate may move in a block
+    drift: Array  # (q,) variance per second
+    noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
+    nominal: Array  # (np,) the unloaded chassis
+    block: int  # samples
+    hold_off: int  # blocks before the first correction
+    speed_gain: float  # of the twins' speeds [1/s]
+    least_excitation: float  # [m2/s4]
+    rate_weight: float  # of a roll or pitch rate in it [m2/s2]
+    memory: float  # of excitation [s]
+    doubt: float  # first factor of the noise's variance, before innovations prove it white
+    doubt_memory: float  # [s]
+    prior: Array  # (q,) standard deviations
+    load: Indices  # (l,) estimates that a change of the load changes
+    watch: int  # blocks of driving after a standstill in which such a change is looked for
+    settle: int  # blocks of driving before the first
+    change_memory: float  # of what contradicts [s]
+    surprise: (
+        float  # least statistic of a change, chi-square of l degrees of freedom if there is none
+    )
+    least_change: float  # and least change of any of them, of its prior sd
+    dt: float  # of a sample [s]
+
+
+class Memory(NamedTuple):
+    """What the observer keeps from sample to sample, beside its twins."""
+
+    theta: Array  # (np,) parameters of twin 0
+    z: Array  # (q,) estimates
+    covariance: Array  # (q, q)
+    out: Array  # (n, ny) the twins' last outputs
+    total: Array  # (n, ny) their sum over the block
+    measured: Array  # (ny,) the measurements' sum
+    present: Array  # (ny,) how many there were
+    states: Array  # (n, nx)
+    dx: Array  # (nx,)
+    p: Array  # (np,) what is set
+    excitation: Array  # (2, 4) means and squares of what excites
+    information: Array  # (q, q) of what was used
+    ring: Array  # (RING, n, ny) the twins' last outputs
+    late: Array  # (n, ny) the twins' outputs of the delay ago
+    edge: Array  # (ny,) of twin 0 at the end of the block before
+    doubt: Array  # (ny,) factor of each channel's variance that its innovations show
+    window: Array  # (3, ny) sums of innovations, of their variance; number of blocks
+    window_h: Array  # (ny, q) sums of sensitivities
+    recent: Array  # (q, q) information of the last seconds
+    score: Array  # (q,) and what it says of the parameters' error
+    kept: Array  # (q,) estimates at the last standstill
+    kept_covariance: Array  # (q, q)
+    kept_doubt: Array  # (ny,)
+    blocks: Indices  # (2,)
+    changes: Indices  # (1,) of the load, so far
+    clock: Indices  # (3,)
+
+
+class Log(NamedTuple):
+    """Histories of N samples, to be filled."""
+
+    states: Array  # (N, nx)
+    parameters: Array  # (N, np)
+    outputs: Array  # (N, ny)
+    extended: Array  # (N, 4, 9)
+    sd: Array  # (N, q)
+    faults: Array  # (N, q - p)
+    changes: Indices  # (N,)

@@ -1,0 +1,173 @@
+import numpy as np
+import pytest
+
+from estimators.identifiability import report
+from estimators.joint import JointObserver, JointSettings
+from scenarios import joint
+from scenarios.joint import Run, clean_drive, truth
+from scenarios.study import variation
+from twin import LOAD, OUTPUTS, PARAMETERS, Fleet, Twin, TwinError, Vehicle, noise_sd
+from twin.kernel import read_states, step
+
+SD = np.array([0.5] * 3 + [0.02] * 3 + [0.05] * 4)
+SEVEN = LOAD[:7]
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return clean_drive("mixed", "same", 12.0)
+
+
+def observer(drive, *, at=None, **settings):
+    made = JointObserver(Vehicle.load("suv"), SD, JointSettings(**settings))
+    made.reset(float(drive.truth["vx"][0]), at, road=drive.inputs[0, 9:13])
+    return made
+
+
+def part(drive, samples):
+    return drive.replace(
+        time=drive.time[samples],
+        inputs=drive.inputs[samples],
+        measurements=drive.measurements[samples],
+        truth={},
+    )
+
+
+def test_cars_of_a_fleet_are_those_of_its_twins():
+    fleet, alone = Fleet(Vehicle.load("suv"), 2), Twin(Vehicle.load("suv"))
+    u, y, expected = np.zeros(13), np.empty(10), np.empty(10)
+    for twin in (*fleet.twins, alone):
+        twin.reset(10.0)
+    u[0] = 0.5
+    for _ in range(100):
+        step(fleet.cars[1], u, y)
+        step(alone.car, u, expected)
+    np.testing.assert_array_equal(y, expected)
+    np.testing.assert_array_equal(fleet.twins[1].read_states(), alone.read_states())
+    assert fleet.twins[0].data.time == 0.0
+
+
+def test_parameters_at_the_truth_stay_there(drive):
+    run = observer(drive, at=variation()).run(drive)
+    off = np.abs(run.parameters[-1] - truth(drive)[-1])
+    assert (off < 0.05 * run.sd[-1, : len(PARAMETERS)]).all()
+
+
+def test_the_load_is_found_without_noise(drive):
+    run = observer(drive, parameters=LOAD, faults=()).run(drive)
+    for name in SEVEN:
+        assert run[name][-1] == pytest.approx(variation()[name], rel=0.02), name
+
+
+def test_shifted_states_are_those_of_a_twin_that_always_had_the_parameter(drive):
+    """To first order: twice the step leaves four times as much."""
+    masses = (0.0, 0.1, 40.0, 80.0)
+    states, y = np.empty((len(masses), 28)), np.empty(10)
+    for mass, x in zip(masses, states, strict=True):
+        twin = Twin(Vehicle.load("suv"))
+        p = np.zeros(len(PARAMETERS))
+        p[0] = mass
+        twin.set_parameters(p)
+        twin.reset(float(drive.truth["vx"][0]))
+        for u in drive.inputs[:4000]:
+            step(twin.car, np.ascontiguousarray(u), y)
+        read_states(twin.car, x)
+    kept = [2, *range(6, 10), *range(14, 28)]  # no place, heading or wheel angle
+    slope = (states[1] - states[0]) / masses[1]
+    left = [
+        np.linalg.norm((x - states[0] - m * slope)[kept])
+        for m, x in zip(masses, states, strict=True)
+    ]
+    assert left[3] / left[2] == pytest.approx(4.0, rel=0.1)
+    assert left[2] < 0.03 * np.linalg.norm((states[2] - states[0])[kept])
+
+
+def test_one_sample_at_a_time_gives_the_run(drive):
+    short = part(drive, slice(0, 1500))
+    whole = observer(drive, parameters=("mass", "Jzz")).run(short)
+    other = observer(drive, parameters=("mass", "Jzz"))
+    for u, y in zip(short.inputs, short.measurements, strict=True):
+        last = other.update(u, y)
+    np.testing.assert_array_equal(last, whole.parameters[-1])
+
+
+def test_run_from_a_snapshot_is_bit_exact(drive):
+    first, second = part(drive, slice(0, 1505)), part(drive, slice(1505, 3000))
+    made = observer(drive, parameters=("mass", "Jzz"))
+    made.run(first)
+    snapshot = made.snapshot()
+    expected = made.run(second)
+    made.restore(snapshot)
+    again = made.run(second)
+    np.testing.assert_array_equal(again.parameters, expected.parameters)
+    np.testing.assert_array_equal(again.covariance, expected.covariance)
+
+
+def test_missing_measurements_do_not_spoil_the_estimate(drive):
+    y = drive.measurements.copy()
+    y[3000:6000, 0] = np.nan
+    y[5000:5500] = np.nan
+    run = observer(drive, parameters=SEVEN, at=variation()).run(drive.replace(measurements=y))
+    assert np.isfinite(run.parameters).all()
+    assert abs(run["mass"][-1] - variation()["mass"]) < 3.0
+
+
+def test_steady_straight_drive_changes_nothing_and_tells_nothing():
+    run = Run(drive="straight", mismatch="imu-bias", snr=10.0, seed=0, duration=6.0)
+    _, estimate = joint.observe(run)
+    assert not estimate.parameters.any()
+    assert not estimate.valid.any()
+    told = report(estimate)
+    assert (
+        "this drive cannot tell the yaw inertia (100 % of what was unknown still is): "
+        in " ".join(told)
+    )
+    assert len(told) >= len(PARAMETERS)
+
+
+def test_delay_and_bias_of_the_sensors_are_found(drive):
+    sd = noise_sd(drive.measurements, 10.0)
+    y = np.roll(drive.measurements, 20, axis=0)
+    y[:20] = drive.measurements[0]
+    y[:, OUTPUTS.index("ay")] += 0.1
+    made = JointObserver(Vehicle.load("suv"), sd, JointSettings(parameters=("mass",)))
+    made.reset(float(drive.truth["vx"][0]), variation())
+    run = made.run(drive.replace(measurements=y))
+    found = dict(zip(run.fault_names, run.faults[-1], strict=True))
+    assert found["delay"] == pytest.approx(0.02, abs=2e-4)
+    assert found["bias_ay"] == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"parameters": ("mass", "colour")}, "parameters are mass, colour; allowed: each at most"),
+        ({"faults": ("delay", "delay")}, "faults are delay, delay; allowed: each at most once"),
+    ],
+)
+def test_unknown_or_repeated_names_are_refused(settings, message):
+    with pytest.raises(TwinError, match=message):
+        JointObserver(Vehicle.load("suv"), SD, JointSettings(**settings))
+
+
+def test_noise_of_nothing_is_refused():
+    with pytest.raises(TwinError, match="allowed: 10 numbers above zero"):
+        JointObserver(Vehicle.load("suv"), np.zeros(10), JointSettings(parameters=("mass",)))
+
+
+def test_rows_tell_error_claim_and_validity_of_every_parameter():
+    rows = joint.rows("mixed", "all-scales", 10.0, [0], 1, 3.0)
+    found = {(row.quantity, row.metric): row.median for row in rows}
+    for name in PARAMETERS:
+        error, sd = found[name, "pct"], found[name, "claimed_sd_pct"]
+        assert found[name, "rmse_over_sd"] == pytest.approx(error / sd)
+        assert found[name, "valid"] in (0.0, 1.0)
+    assert 0.0 <= found["all", "coverage"] <= 1.0
+
+
+@pytest.mark.slow
+def test_change_of_load_is_found_and_nothing_else_thrown_off():
+    score = joint.score(Run(drive="load-change", mismatch="same", snr=10.0, seed=0))
+    assert score.seconds < 20.0
+    assert score.worst < 3.0
+    assert abs(score.error[0]) < 3.0
