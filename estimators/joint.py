@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimators import joint_kernel
 from estimators.estimate import Estimate
-from estimators.joint_memory import RING, Log, Memory, Setup
 from estimators.given import check_drive, check_measurements
+from estimators.joint_memory import RING, Log, Memory, Setup
 from twin import (
     LOAD,
     OUTPUTS,
