@@ -6,6 +6,7 @@ import uuid
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,14 +31,14 @@ def save_snapshot(path: str | Path, observer: Observer, more: Mapping[str, Array
         TwinError: the observer's black box is another's, or the file cannot be written.
     """
     path = Path(path)
-    arrays: dict[str, NDArray] = {"fingerprint": np.array(_fingerprint(observer))}
+    arrays: dict[str, Any] = {"fingerprint": np.array(_fingerprint(observer))}
     arrays |= {_TWIN + k: v for k, v in _twin(observer).snapshot()._asdict().items()}
     arrays |= {_MEMORY + k: v for k, v in observer.memory._asdict().items()}
     arrays |= {_MORE + k: np.asarray(v) for k, v in more.items()}
     partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
         with partial.open("wb") as file:
-            np.savez(file, **arrays)
+            np.savez(file, allow_pickle=False, **arrays)
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)

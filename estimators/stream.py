@@ -66,6 +66,7 @@ class Stream:
         self._u = np.full(len(observer.twin.inputs), np.nan)
         self._y = np.full(len(observer.twin.outputs), np.nan)
         self._late: list[float] = []
+        self._unknown = np.empty(0), np.empty(0)  # states and parameters before any step
 
     def update(
         self, time: float, u: ArrayLike, y: ArrayLike, speed: float = math.nan
@@ -180,6 +181,7 @@ class Stream:
             times, both_u = np.array([self._time, time]), np.array([self._u, u])
             both_y = np.array([self._y, y])
             inputs, measurements = between(due, times, both_u, both_y, _SLACK * twin.dt)
+        states, p = self._unknown
         for row_u, row_y in zip(inputs, measurements, strict=True):
             states = twin.read_states()
             p = self.observer.update(row_u, row_y)

@@ -258,7 +258,7 @@ def _write_history(task: Task, found: Found) -> None:
 
     estimate = found.estimate
     names = dict.fromkeys((*found.parameters, *_KEPT))
-    columns = {"time": estimate.time, "sideslip": sideslip(found)}
+    columns: dict[str, Any] = {"time": estimate.time, "sideslip": sideslip(found)}
     columns |= {name: estimate[name] for name in names}
     if estimate.trustworthy is not None:
         columns["trustworthy"] = estimate.trustworthy

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.estimate import Estimate
-from estimators.joint import JointObserver
+from estimators.joint import JointObserver, JointSettings
 from estimators.observer import Observer
 from estimators.stream import rolling_radius
 from scenarios.calibrate import driven
 from scenarios.default_observer import default_observer
 from scenarios.log_pieces import Prepared, lacking, measured, start_speed
-from twin import OUTPUTS, SCALES, Drive, Twin, TwinError, Vehicle
+from twin import LOAD, OUTPUTS, SCALES, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
 # Least noise that a sensor is believed to have, as in the simulated drives
@@ -78,7 +78,7 @@ def joint(vehicle: Vehicle, log: Prepared) -> Found:
     piece = _joined_drives(log.pieces)
     names = measured(log.pieces)
     noise = np.where([name in names for name in OUTPUTS], _noise_sd(piece), np.nan)
-    observer = JointObserver(vehicle, noise)
+    observer = JointObserver(vehicle, noise, JointSettings(parameters=(*LOAD, *SCALES)))
     observer.reset(start_speed(piece, rolling_radius(Observer(Twin(vehicle), []))))
     plain = piece.replace(measurements=piece.measurements[:, : len(OUTPUTS)], output_names=OUTPUTS)
     estimate = observer.run(plain)

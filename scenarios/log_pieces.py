@@ -61,7 +61,7 @@ def measured(pieces: Sequence[Drive]) -> set[str]:
     """
     names = set()
     for piece in pieces:
-        finite = np.isfinite(piece.measurements).any(axis=0)
+        finite = np.asarray(np.isfinite(piece.measurements).any(axis=0))
         names |= {name for name, there in zip(piece.output_names, finite, strict=True) if there}
         moving = np.atleast_1d(np.ptp(piece.inputs, axis=0) > 0.0)
         declared = (*TORQUES, *piece.settings.get("log", {}).get("constants", ()))
