@@ -12,6 +12,12 @@ from scenarios.catalogue import SCENARIOS, Entry
 STANDARD_OUTPUT = Path("-")
 
 
+class Mistake(click.ClickException):
+    """Something the user can mend."""
+
+    exit_code = 2
+
+
 class Name(click.ParamType):
     """A name in a part of the catalogue."""
 

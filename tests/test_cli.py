@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from scenarios import __main__ as cli
+from scenarios import catalogue
 from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Entry, Scenario
 from scenarios.result import Result, Row
 from twin import TwinError
@@ -173,13 +174,13 @@ def test_reproduction_named_twice_runs_once(til):
 
 
 def test_bench_has_the_same_shape(til, monkeypatch):
-    monkeypatch.setattr(cli.catalogue, "bench", lambda: lambda: make_result("bench", {}, [0]))
+    monkeypatch.setattr(catalogue, "bench", lambda: lambda: make_result("bench", {}, [0]))
     assert run_json(til, "bench")["name"] == "bench"
 
 
 @pytest.fixture
 def limits(monkeypatch):
-    monkeypatch.setattr(cli.catalogue, "limits", lambda: limit_fake)
+    monkeypatch.setattr(catalogue, "limits", lambda: limit_fake)
 
 
 @pytest.mark.usefixtures("limits")
