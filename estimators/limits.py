@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.observer import Observer
-from twin import PARAMETERS, SCALES, Drive, Twin, TwinError
+from twin import FORCES, PARAMETERS, SCALES, Drive, Twin, TwinError
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,7 @@ OFFSETS = {
     **{"Jxx": 10.0, "Jyy": 30.0, "Jzz": 30.0},
     **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 10.0),
     **dict.fromkeys(SCALES, 0.01),
+    **dict.fromkeys(FORCES, 100.0),
 }
 
 # Differences are good to some 1e-4 of a sensitivity. Of scaled information, less than the square of

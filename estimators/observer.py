@@ -68,6 +68,7 @@ class Observer:
         twin: BlackBox,
         laws: Sequence[ParameterLaw],
         gains: Mapping[tuple[str, str], float] | None = None,
+        *,
         every: int = 1,
         guarded: bool = False,
         follower: SpeedFollower | None = None,

@@ -171,7 +171,7 @@ def make_observer(run: Run) -> Observer:
     if run.estimator == "til-paper":
         values = _values(run, car, "til-paper")
         law = state_and_mass.paper_mass_law(values)
-        return Observer(twin, [law], state_and_mass.state_gains(values), run.every)
+        return Observer(twin, [law], state_and_mass.state_gains(values), every=run.every)
     if run.estimator not in ("til", WITH_FORCES):
         raise TwinError(f"estimator is {run.estimator!r}; allowed: {', '.join(ESTIMATORS)}")
     values = _values(run, car, "til")
@@ -182,7 +182,7 @@ def make_observer(run: Run) -> Observer:
         laws += state_and_mass.axle_force_laws(
             values, AXLE_FORCE_BANDWIDTH, AXLE_FORCE_LEAK, model.mass, model.yaw_inertia, axles
         )
-    return Observer(twin, laws, state_and_mass.state_gains(values), run.every)
+    return Observer(twin, laws, state_and_mass.state_gains(values), every=run.every)
 
 
 @cache

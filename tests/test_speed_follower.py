@@ -69,7 +69,7 @@ def torqueless(speed, **channels):
 
 
 def observer(follower=None, gains=None):
-    made = Observer(Twin(SUV), (), gains, follower)
+    made = Observer(Twin(SUV), (), gains, follower=follower)
     made.reset(20.0)
     return made
 
