@@ -113,7 +113,13 @@ def _send_plot(
             colors=[_BAND, _BAND, tl.TWIN],
             widths=[1.5, 1.5, 2.5],
         ),
-        "truth": rr.SeriesLines(names="truth", colors=tl.TRUTH, widths=1.5),
+        "truth": rr.SeriesLines(
+            names="truth",
+            colors=tl.TRUTH,
+            widths=1.5,
+            # Its few corners are not to be averaged
+            aggregation_policy=rr.components.AggregationPolicy.Off,
+        ),
         "change": rr.SeriesPoints(
             names="change of load found", colors=_CHANGE, markers="diamond", marker_sizes=5.0
         ),
