@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.identifiability import report
-from estimators.joint import JointEstimate, JointObserver, JointSettings
+from estimators.joint import FAULTS, JointEstimate, JointObserver, JointSettings
 from estimators.limits import limits
 from estimators.score import settling_time
 from scenarios import joint_drives
@@ -25,9 +25,10 @@ from scenarios.mismatch import MISMATCHES, real_drive, real_vehicle
 from scenarios.progress import parallel, progress
 from scenarios.record import Manoeuvre, record
 from scenarios.result import Result, Row
+from scenarios.sensors import Sensors
 from scenarios.study import REAL, TWIN, variation
 from scenarios.vehicles import SUV_LOADS
-from twin import LOAD, OUTPUTS, PARAMETERS, SCALES, Drive, Vehicle, noise_sd, parameter_deltas
+from twin import LOAD, OUTPUTS, SCALES, Drive, Vehicle, noise_sd, parameter_deltas
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ MANOEUVRES: dict[str, Callable[[float | None], Manoeuvre]] = {
 LOAD_CHANGE = "load-change"
 GET_OUT = ("rear_left_passenger", "rear_right_passenger")  # 145 kg
 BLOCK = 10  # samples
+ESTIMATED = (*LOAD, *SCALES)  # the first of `twin.PARAMETERS`; forces on the axles are none of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +65,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """Of one run, each of `PARAMETERS`: shape (15,).
+    """Of one run, each of `ESTIMATED`: shape (15,).
 
     Attributes:
         error: at the end, estimate less truth.
@@ -96,13 +98,19 @@ def clean_drive(drive: str, mismatch: str, duration: float | None) -> Drive:
 
 
 def truth(drive: Drive) -> Array:
-    """(N, 15) deltas of the real vehicle from the twin's, of `PARAMETERS`."""
+    """(N, 15) deltas of the real vehicle from the twin's, of `ESTIMATED`."""
     nominal = Vehicle.load(TWIN).chassis()
-    zero = parameter_deltas(nominal, nominal)
-    values = np.column_stack([drive.truth[name] for name in PARAMETERS])
+    zero = parameter_deltas(nominal, nominal)[: len(ESTIMATED)]
+    values = np.column_stack([drive.truth[name] for name in ESTIMATED])
     inertia = nominal.inertia[[0, 0, 1], [1, 2, 2]]
     base = [nominal.mass, *nominal.cm, *np.diag(nominal.inertia), *inertia, *(1.0 for _ in SCALES)]
     return values - np.array(base) + zero
+
+
+def faults(sensors: Sensors) -> dict[str, float]:
+    """What the observer should find of the sensors, by name of `estimators.joint.FAULTS`."""
+    biases = (*sensors.acceleration_bias, *sensors.rate_bias)
+    return dict(zip(FAULTS, (*biases, sensors.delay, *sensors.position), strict=True))
 
 
 def observe(
@@ -122,14 +130,14 @@ def observe(
 def score(run: Run) -> Score:
     """Scores one run."""
     drive, estimate = observe(run)
-    off = estimate.parameters - truth(drive)
+    off = estimate.parameters[:, : len(ESTIMATED)] - truth(drive)
     variations = _units()
-    sd = estimate.sd[:, : len(PARAMETERS)]
+    sd = estimate.sd[:, : len(ESTIMATED)]
     times = [
         settling_time(off[:, i] + variations[i], variations[i], drive.dt)
         if name in LOAD
         else np.nan
-        for i, name in enumerate(PARAMETERS)
+        for i, name in enumerate(ESTIMATED)
     ]
     found = np.flatnonzero(np.diff(estimate.changes))
     moving = np.cumsum(drive.truth["vx"] > 1.0) * drive.dt
@@ -140,7 +148,7 @@ def score(run: Run) -> Score:
     return Score(
         error=off[-1],
         sd=sd[-1],
-        valid=estimate.valid[-1, : len(PARAMETERS)],
+        valid=estimate.valid[-1, : len(ESTIMATED)],
         time=np.array(times),
         seconds=seconds,
         worst=float((np.abs(off[after, others]) / sd[after, others]).max()),
@@ -157,16 +165,16 @@ def bound(drive: str, snr: float, duration: float | None) -> Array:
     n = len(clean) // BLOCK * BLOCK
     columns = [
         sensitivity_at_truth(TWIN, clean, [name], variation())[0, :n]
-        for name in progress(PARAMETERS, "bound", len(PARAMETERS))
+        for name in progress(ESTIMATED, "bound", len(ESTIMATED))
     ]
     means = np.array([c.reshape(-1, BLOCK, len(OUTPUTS)).mean(axis=1) for c in columns])
     sd = noise_sd(clean.measurements, snr) / np.sqrt(BLOCK)
-    return limits(PARAMETERS, means, sd).joint
+    return limits(ESTIMATED, means, sd).joint
 
 
 def _units() -> Array:
     """(15,) what 100 % is: of a load what it changes, of a scale its nominal value."""
-    return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in PARAMETERS])
+    return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in ESTIMATED])
 
 
 def rows(
@@ -187,7 +195,7 @@ def rows(
     found: list[Row] = []
     covered = []
     least = bound(drive, snr, duration) if with_bound else None
-    for i, name in enumerate(PARAMETERS):
+    for i, name in enumerate(ESTIMATED):
         one = partial(Row.over_seeds, case=case, quantity=name, estimator="joint")
         errors = np.array([s.error[i] for s in scores])
         sds = np.array([s.sd[i] for s in scores])
@@ -237,19 +245,19 @@ def scenario(name: str) -> Scenario:
         )
 
     def timeline(settings: Settings, path: Path) -> None:
-        from scenarios.timeline import write_timeline
+        from scenarios.timeline_joint import write_joint_timeline
 
         duration = None if name == LOAD_CHANGE else settings.duration
         seed = settings.seeds[0]
         drive, estimate = observe(
             Run(drive=name, mismatch="same", snr=settings.snr, seed=seed, duration=duration)
         )
-        write_timeline(
+        write_joint_timeline(
             path,
             vehicle=Vehicle.load(REAL),
             drive=drive.replace(settings=drive.settings | {"report": report(estimate)}),
             estimate=estimate,
-            parameters=PARAMETERS,
+            faults=faults(MISMATCHES["same"].sensors),
             title=name,
         )
 

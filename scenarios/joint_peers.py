@@ -11,8 +11,9 @@ from estimators.offline_fit import offline_fit
 from estimators.staged import staged
 from estimators.unscented import unscented
 from scenarios import mass, pitch, roll_yaw
-from twin import PARAMETERS, Drive, Twin, Vehicle
+from twin import LOAD, SCALES, Drive, Twin, Vehicle
 
+ESTIMATED = (*LOAD, *SCALES)
 Peer = Callable[[Vehicle, Drive, ArrayLike, float], Estimate]
 """Observes with a vehicle's twin a drive, given its noise (10,) and its first speed [m/s]."""
 
@@ -51,11 +52,11 @@ def _paper(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) ->
 
 
 def _unscented(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return unscented(vehicle, drive, noise_sd, PARAMETERS, speed=speed)
+    return unscented(vehicle, drive, noise_sd, ESTIMATED, speed=speed)
 
 
 def _least_squares(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return offline_fit(vehicle, drive, noise_sd, PARAMETERS, speed=speed)
+    return offline_fit(vehicle, drive, noise_sd, ESTIMATED, speed=speed)
 
 
 PEERS: Mapping[str, Peer] = {

@@ -175,10 +175,10 @@ def _check_whole(path: Path) -> None:
 
 def frames(time: Array) -> NDArray[np.int64]:
     """Indices of the samples that 3D shows."""
-    return _samples(time, FRAME_RATE)
+    return thinned(time, FRAME_RATE)
 
 
-def _samples(time: Array, rate: float) -> NDArray[np.int64]:
+def thinned(time: Array, rate: float) -> NDArray[np.int64]:
     """Indices of samples at no more than a rate [Hz], the first and the last among them."""
     period = np.floor((time - time[0]) * rate + 1e-6)
     first = np.flatnonzero(np.diff(period, prepend=-1.0) > 0.0)
@@ -196,8 +196,14 @@ def _parameter_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
             Line("truth", "truth", truth, TRUTH, 2.0),
         ]
     lines.append(Line("estimate", "estimate", estimate[name], TWIN, 2.5))
-    unit = "1" if name in twin.SCALES else {"m": "kg", "c": "m", "J": "kg m²", "a": "N"}[name[0]]
-    return Plot(f"parameters/{name}", f"{name}: change from nominal [{unit}]", lines)
+    return Plot(f"parameters/{name}", f"{name}: change from nominal [{unit_of(name)}]", lines)
+
+
+def unit_of(parameter: str) -> str:
+    """The unit of one of `twin.PARAMETERS`."""
+    if parameter in twin.SCALES:
+        return "1"
+    return {"m": "kg", "c": "m", "J": "kg m²", "a": "N"}[parameter[0]]
 
 
 def _signal_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
@@ -228,7 +234,7 @@ def send_plot(recording: rr.RecordingStream, time: Array, plot: Plot) -> None:
     """Logs the series of a plot over time (N,) [s]."""
     import rerun as rr
 
-    samples = _samples(time, PLOT_RATE)
+    samples = thinned(time, PLOT_RATE)
     index = [rr.TimeColumn("time", duration=time[samples])]
     for line in plot.lines:
         entity = f"{plot.entity}/{line.entity}"
@@ -275,6 +281,13 @@ def _blueprint(
     )
 
 
+def everything() -> rr.TimeRange:
+    """All of time, for an axis."""
+    import rerun as rr
+
+    return rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+
+
 def plot_view(
     plot: Plot,
     *,
@@ -290,17 +303,13 @@ def plot_view(
         left: which corner.
         limits: of the vertical axis; by default all fits.
     """
-    import rerun as rr
     import rerun.blueprint as rrb
 
-    everything = rr.TimeRange(
-        start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
-    )
     corner = rrb.Corner2D.LeftBottom if left else rrb.Corner2D.RightBottom
     return rrb.TimeSeriesView(
         origin=plot.entity,
         name=plot.title,
-        axis_x=rrb.TimeAxis(view_range=everything),
+        axis_x=rrb.TimeAxis(view_range=everything()),
         axis_y=rrb.ScalarAxis(range=limits) if limits else None,
         plot_legend=rrb.PlotLegend(corner, visible=legend),
     )

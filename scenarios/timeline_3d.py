@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 WORLD = "world"
+BACKGROUND = (24, 27, 32)
 NEWTONS_PER_METRE = 5000.0  # scale of the force arrows
 _CHASSIS_OPACITY = 0.45  # shows loads and forces inside
 _FORCE_COLOUR = (240, 190, 40)
@@ -61,6 +62,13 @@ class Poses(NamedTuple):
     quaternions: Array
     wheels: NDArray[np.int64]
     axes: Array
+
+
+class _Look(NamedTuple):
+    """How shapes look: (ngeom, 4) colours, or outlines of one colour instead."""
+
+    colours: NDArray[np.float32]
+    outlines: tuple[int, int, int] | None
 
 
 def motion(drive: twin.Drive, estimate: Estimate, frames: NDArray[np.int64]) -> Motion:
@@ -167,7 +175,7 @@ def view_of(name: str, eye: Array, target: Array) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin=WORLD,
         name=name,
-        background=(24, 27, 32),
+        background=BACKGROUND,
         line_grid=rrb.LineGrid3D(spacing=5.0, color=(255, 255, 255, 40)),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
@@ -178,14 +186,27 @@ def view_of(name: str, eye: Array, target: Array) -> rrb.Spatial3DView:
     )
 
 
-def log_car(recording: rr.RecordingStream, model: mujoco.MjModel, moved: Motion) -> None:
-    """Logs the car's shapes, poses, path and, where they are known, tyre forces."""
+def log_car(
+    recording: rr.RecordingStream,
+    model: mujoco.MjModel,
+    moved: Motion,
+    *,
+    opacity: float = _CHASSIS_OPACITY,
+) -> None:
+    """Logs the car's shapes, poses, path and, where they are known, tyre forces.
+
+    Args:
+        recording: to log to.
+        model: of the car.
+        moved: what it does.
+        opacity: of the chassis, 0..1.
+    """
     import rerun as rr
 
     placed = poses(model, moved)
     points, axes = contacts(placed, moved.road)
     index = [rr.TimeColumn("time", duration=moved.time)]
-    log_bodies(recording, model, index, placed.positions, placed.quaternions)
+    log_bodies(recording, model, index, placed.positions, placed.quaternions, opacity=opacity)
     path = rr.LineStrips3D([points.mean(axis=1)], colors=_PATH_COLOUR, radii=0.04)
     recording.log(f"{WORLD}/path", path, static=True)
     _log_road(recording, points)
@@ -228,7 +249,8 @@ def log_bodies(
     quaternions: Array,
     *,
     root: str = WORLD,
-    tint: tuple[float, float, float, float] | None = None,
+    opacity: float = _CHASSIS_OPACITY,
+    outlines: tuple[int, int, int] | None = None,
 ) -> None:
     """Logs the shapes of all bodies, and their poses over n frames as in `Poses`.
 
@@ -239,14 +261,16 @@ def log_bodies(
         positions: (n, nbody, 3) [m].
         quaternions: (n, nbody, 4).
         root: entity above the bodies.
-        tint: red, green, blue, opacity of all shapes; by default each has its own.
+        opacity: of the chassis, 0..1.
+        outlines: colour of the outlines that stand for the shapes; by default shapes are solid.
     """
     import rerun as rr
 
     recording.log(WORLD, rr.ViewCoordinates.FLU, static=True)
     for body in np.unique(model.geom_bodyid[model.geom_bodyid > 0]):
         name = f"{root}/{model.body(body).name}"
-        _log_shapes(recording, name, model, body, tint)
+        look = _Look(_colours(model, opacity), outlines)
+        _log_shapes(recording, name, model, body, look)
         columns = rr.Transform3D.columns(
             translation=positions[:, body],
             quaternion=quaternions[:, body][:, [1, 2, 3, 0]],
@@ -270,7 +294,7 @@ def _log_shapes(
     entity: str,
     model: mujoco.MjModel,
     body: int,
-    tint: tuple[float, float, float, float] | None,
+    look: _Look,
 ) -> None:
     """Logs a body's boxes, cylinders and ellipsoids in its frame; other shapes are left out."""
     import rerun as rr
@@ -283,8 +307,8 @@ def _log_shapes(
         common = {
             "centers": model.geom_pos[geoms],
             "quaternions": model.geom_quat[geoms][:, [1, 2, 3, 0]],
-            "colors": _colours(model, geoms) if tint is None else [tint] * len(geoms),
-            "fill_mode": "solid",
+            "colors": look.colours[geoms] if look.outlines is None else look.outlines,
+            "fill_mode": "solid" if look.outlines is None else "majorwireframe",
         }
         if shape == "boxes":
             drawn = rr.Boxes3D(half_sizes=size, **common)
@@ -296,10 +320,10 @@ def _log_shapes(
         recording.log(f"{entity}/{shape}", drawn, static=True)
 
 
-def _colours(model: mujoco.MjModel, geoms: NDArray[np.int64]) -> NDArray[np.float32]:
-    """(n, 4) red, green, blue, opacity in 0..1: those of the material where there is one."""
-    material = model.geom_matid[geoms]
-    colours = model.geom_rgba[geoms].copy()
+def _colours(model: mujoco.MjModel, opacity: float) -> NDArray[np.float32]:
+    """(ngeom, 4) red, green, blue, opacity in 0..1: those of the material where there is one."""
+    material = model.geom_matid
+    colours = model.geom_rgba.copy()
     colours[material >= 0] = model.mat_rgba[material[material >= 0]]
-    colours[model.geom_bodyid[geoms] == model.body("chassis").id, 3] *= _CHASSIS_OPACITY
+    colours[model.geom_bodyid == model.body("chassis").id, 3] *= opacity
     return colours

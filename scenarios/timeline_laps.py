@@ -5,7 +5,7 @@ vehicle is and moves where the vehicle moves; how it stands to that, its sidesli
 are its own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,15 +30,20 @@ from scenarios.timeline import (
     send_plot,
 )
 from scenarios.timeline_3d import Motion
+from scenarios.timeline_states import Colour, Lane, lanes_view, send_lane
 from twin import STATES, Drive, TwinError, Vehicle
 
 if TYPE_CHECKING:
+    import rerun as rr
     import rerun.blueprint as rrb
 
 Array = NDArray[np.float64]
 
 COLOURS = {"til": TWIN, "double-track": (90, 150, 230)}
-GHOST = (0.95, 0.5, 0.2, 0.35)
+_CLOSED: Colour = (75, 80, 90)
+MAP = "map"
+MAP_MARGIN = 40.0  # [m] around the way: chosen
+CORRECTED = "mass is corrected"
 YAW, VX, VY = STATES.index("yaw"), STATES.index("vx"), STATES.index("vy")
 
 
@@ -58,11 +63,12 @@ def write(path: Path, runs: Sequence[Run], title: str) -> None:
     if "til" not in seen or seen["til"][1].estimate is None:
         raise TwinError(f"{path}: a timeline needs a run of til")
     drive, estimate = seen["til"][0], seen["til"][1].estimate
-    plots = _plots(drive, estimate, {name: found for name, (_, found) in seen.items()})
+    plots = _plots(drive, {name: found for name, (_, found) in seen.items()})
+    lanes = _lanes(drive, estimate)
     moved = timeline_3d.motion(drive, estimate, frames(drive.time))
     run = first["til"]
     vehicle = real_vehicle(Vehicle.load("sports_car"), MISMATCHES[run.case])
-    with recording_to(path, _blueprint(plots, moved), title, drive.settings) as recording:
+    with recording_to(path, _blueprint(plots, lanes, moved), title, drive.settings) as recording:
         import rerun as rr
 
         timeline_3d.log_car(recording, vehicle.compile(), moved)
@@ -74,10 +80,13 @@ def write(path: Path, runs: Sequence[Run], title: str) -> None:
             ghost.positions,
             ghost.quaternions,
             root=f"{timeline_3d.WORLD}/twin",
-            tint=GHOST,
+            outlines=TWIN,
         )
+        _log_map(recording, moved)
         for plot in plots:
             send_plot(recording, drive.time, plot)
+        for lane in lanes:
+            send_lane(recording, drive.time, lane)
 
 
 def gates(drive: Drive, estimate: Estimate) -> dict[str, Array]:
@@ -87,7 +96,7 @@ def gates(drive: Drive, estimate: Estimate) -> dict[str, Array]:
     return {
         "straight ahead": turning.astype(np.float64),
         "speeding up or braking": pushing.astype(np.float64),
-        "mass is corrected": (turning & pushing).astype(np.float64),
+        CORRECTED: (turning & pushing).astype(np.float64),
     }
 
 
@@ -101,46 +110,82 @@ def _ghost(moved: Motion, estimate: Estimate, shown: NDArray[np.int64]) -> Motio
     return moved._replace(states=states, forces=None)
 
 
-def _plots(drive: Drive, estimate: Estimate, beliefs: dict[str, Belief]) -> list[Plot]:
-    sideslip = [
-        Line(name.replace("-", "_"), name, np.degrees(found.sideslip), COLOURS[name], 2.5)
-        for name, found in beliefs.items()
-    ]
-    truth = np.degrees(drive.truth["sideslip"])
-    sideslip.append(Line("truth", "truth", truth, TRUTH, 1.2))
-    mass = [
-        Line(name.replace("-", "_"), name, found.mass, COLOURS[name], 2.5)
-        for name, found in beliefs.items()
-    ]
-    mass.append(Line("truth", "truth", np.zeros(len(drive)), TRUTH, 1.2))
-    speed = [Line("vehicle", "vehicle", 3.6 * drive.truth["vx"], TRUTH, 1.2)]
-    states = zip(
-        gates(drive, estimate).items(), (MEASURED, BAND_COLOUR, TWIN), (4.0, 2.0, 0.0), strict=True
-    )
+def _lanes(drive: Drive, estimate: Estimate) -> list[Lane]:
     return [
-        Plot("sideslip", "sideslip [deg]", sideslip),
-        Plot("mass", "error of the mass [kg]", mass),
-        Plot(
-            "gates",
-            "gates, up where open",
-            [
-                Line(name.replace(" ", "_"), name, values + height, colour, 2.0)
-                for (name, values), colour, height in states
-            ],
-        ),
-        Plot("speed", "speed [km/h]", speed),
+        Lane(
+            f"gates/{name.replace(' ', '_')}",
+            values.astype(np.int64),
+            {"closed": _CLOSED, "open": TWIN if name == CORRECTED else BAND_COLOUR},
+        )
+        for name, values in gates(drive, estimate).items()
     ]
 
 
-def _blueprint(plots: Sequence[Plot], moved: Motion) -> "rrb.Blueprint":
+def _plots(drive: Drive, beliefs: dict[str, Belief]) -> list[Plot]:
+    """Sideslip, its error, the error of the mass and the speed."""
+    truth = np.degrees(drive.truth["sideslip"])
+
+    def lines(values: Callable[[Belief], Array], true: Array) -> list[Line]:
+        found = [
+            Line(name.replace("-", "_"), name, values(belief), COLOURS[name], 2.5)
+            for name, belief in beliefs.items()
+        ]
+        return [*found, Line("truth", "truth", true, TRUTH, 1.2)]
+
+    zero = np.zeros(len(drive))
+    return [
+        Plot("sideslip", "sideslip [deg]", lines(lambda b: np.degrees(b.sideslip), truth)),
+        Plot(
+            "sideslip_error",
+            "error of the sideslip [deg]",
+            lines(lambda b: np.degrees(b.sideslip) - truth, zero),
+        ),
+        Plot("mass", "error of the mass [kg]", lines(lambda b: b.mass, zero)),
+        Plot(
+            "speed",
+            "speed [km/h]",
+            [Line("vehicle", "vehicle", 3.6 * drive.truth["vx"], TRUTH, 1.2)],
+        ),
+    ]
+
+
+def _log_map(recording: "rr.RecordingStream", moved: Motion) -> None:
+    """Logs the way and where on it the car is, seen from above; a picture's y points down."""
+    import rerun as rr
+
+    way = moved.states[:, :2] * (1.0, -1.0)
+    line = rr.LineStrips2D([way], colors=MEASURED, radii=rr.Radius.ui_points(1.5))
+    recording.log(f"{MAP}/way", line, static=True)
+    dot = rr.Points2D.from_fields(colors=TRUTH, radii=rr.Radius.ui_points(6.0))
+    recording.log(f"{MAP}/vehicle", dot, static=True)
+    index = [rr.TimeColumn("time", duration=moved.time)]
+    recording.send_columns(f"{MAP}/vehicle", index, rr.Points2D.columns(positions=way))
+
+
+def _blueprint(plots: Sequence[Plot], lanes: Sequence[Lane], moved: Motion) -> "rrb.Blueprint":
     import rerun.blueprint as rrb
 
-    scene = timeline_3d.scene("vehicle, its twin as a ghost", moved)
-    views = [plot_view(plot, legend=True, left=True) for plot in plots[:-1]]
+    scene = timeline_3d.scene("vehicle, its twin in outlines", moved)
+    # One legend: all plots have the same colours, and laps and lane changes begin straight ahead
+    *views, speed = [plot_view(p, legend=p.entity == "sideslip", left=True) for p in plots]
+    (left, bottom), (right, top) = (f(moved.states[:, :2], axis=0) for f in (np.min, np.max))
+    above = rrb.Spatial2DView(
+        origin=MAP,
+        name="from above",
+        background=timeline_3d.BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=(left - MAP_MARGIN, right + MAP_MARGIN),
+            y_range=(-top - MAP_MARGIN, -bottom + MAP_MARGIN),
+        ),
+    )
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(scene, plot_view(plots[-1], legend=False), row_shares=[3, 1]),
-            rrb.Vertical(*views),
+            rrb.Vertical(scene, rrb.Horizontal(above, speed), row_shares=[2, 1]),
+            rrb.Vertical(
+                *views,
+                lanes_view("gates of the mass", [lane.entity for lane in lanes]),
+                row_shares=[10, 10, 10, 9],
+            ),
             column_shares=[1, 1],
         ),
         rrb.TimePanel(state="collapsed", timeline="time"),

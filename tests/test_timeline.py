@@ -117,12 +117,12 @@ def test_plots_have_at_most_100_samples_a_second_and_poses_30(rrd):
 
 
 def test_a_slow_log_keeps_every_sample():
-    np.testing.assert_array_equal(timeline._samples(np.arange(50) * 0.02, 100.0), np.arange(50))
+    np.testing.assert_array_equal(timeline.thinned(np.arange(50) * 0.02, 100.0), np.arange(50))
 
 
 def test_samples_of_an_unsteady_log_keep_the_rate_and_both_ends():
     time = np.cumsum(np.random.default_rng(3).uniform(1e-4, 3e-3, 5000))
-    samples = timeline._samples(time, 100.0)
+    samples = timeline.thinned(time, 100.0)
     assert (samples[0], samples[-1]) == (0, 4999)
     assert len(samples) <= np.ceil((time[-1] - time[0]) * 100.0) + 1
     assert np.diff(time[samples]).max() < 0.02
@@ -135,7 +135,7 @@ def test_band_is_a_tenth_of_the_variation_around_the_truth(rrd):
     np.testing.assert_allclose(value("truth"), 200.0)
     np.testing.assert_allclose(value("upper"), 220.0)
     np.testing.assert_allclose(value("lower"), 180.0)
-    samples = timeline._samples(make_drive().time, 100.0)
+    samples = timeline.thinned(make_drive().time, 100.0)
     np.testing.assert_array_equal(value("estimate"), make_estimate()["mass"][samples])
 
 
@@ -177,7 +177,7 @@ def test_title_names_the_recording(rrd):
 
 def test_car_stands_where_the_truth_says(rrd):
     drive = make_drive()
-    samples = timeline._samples(drive.time, 30.0)
+    samples = timeline.thinned(drive.time, 30.0)
     truth = np.stack([drive.truth[name][samples] for name in "xyz"], axis=1)
     np.testing.assert_allclose(
         column(rrd, "/world/chassis", "Transform3D:translation"), truth, atol=1e-5
@@ -191,7 +191,7 @@ def test_a_log_without_truth_shows_the_twin(tmp_path, vehicle):
         *("/parameters/mass/estimate", "/signals/ax/measured", "/signals/ax/twin", "/speed/twin"),
     }
     assert "/world/tyre_forces" not in entities
-    states = make_estimate().states[timeline._samples(make_drive().time, 30.0)]
+    states = make_estimate().states[timeline.thinned(make_drive().time, 30.0)]
     np.testing.assert_allclose(
         column(path, "/world/chassis", "Transform3D:translation"), states[:, :3], atol=1e-6
     )
