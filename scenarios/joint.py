@@ -27,7 +27,7 @@ from scenarios.record import Manoeuvre, record
 from scenarios.result import Result, Row
 from scenarios.study import REAL, TWIN, variation
 from scenarios.vehicles import SUV_LOADS
-from twin import LOAD, OUTPUTS, PARAMETERS, SCALES, Drive, Vehicle, noise_sd, parameter_deltas
+from twin import LOAD, OUTPUTS, SCALES, Drive, Vehicle, noise_sd
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,7 @@ MANOEUVRES: dict[str, Callable[[float | None], Manoeuvre]] = {
 LOAD_CHANGE = "load-change"
 GET_OUT = ("rear_left_passenger", "rear_right_passenger")  # 145 kg
 BLOCK = 10  # samples
+NAMES = (*LOAD, *SCALES)  # estimated in all of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +64,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """Of one run, each of `PARAMETERS`: shape (15,).
+    """Of one run, each of `NAMES`.
 
     Attributes:
         error: at the end, estimate less truth.
@@ -96,13 +97,12 @@ def clean_drive(drive: str, mismatch: str, duration: float | None) -> Drive:
 
 
 def truth(drive: Drive) -> Array:
-    """(N, 15) deltas of the real vehicle from the twin's, of `PARAMETERS`."""
+    """(N, p) deltas of the real vehicle from the twin's, of `NAMES`."""
     nominal = Vehicle.load(TWIN).chassis()
-    zero = parameter_deltas(nominal, nominal)
-    values = np.column_stack([drive.truth[name] for name in PARAMETERS])
+    values = np.column_stack([drive.truth[name] for name in NAMES])
     inertia = nominal.inertia[[0, 0, 1], [1, 2, 2]]
     base = [nominal.mass, *nominal.cm, *np.diag(nominal.inertia), *inertia, *(1.0 for _ in SCALES)]
-    return values - np.array(base) + zero
+    return values - np.array(base)
 
 
 def observe(
@@ -122,14 +122,14 @@ def observe(
 def score(run: Run) -> Score:
     """Scores one run."""
     drive, estimate = observe(run)
-    off = estimate.parameters - truth(drive)
+    off = estimate.parameters[:, : len(NAMES)] - truth(drive)
     variations = _units()
-    sd = estimate.sd[:, : len(PARAMETERS)]
+    sd = estimate.sd[:, : len(NAMES)]
     times = [
         settling_time(off[:, i] + variations[i], variations[i], drive.dt)
         if name in LOAD
         else np.nan
-        for i, name in enumerate(PARAMETERS)
+        for i, name in enumerate(NAMES)
     ]
     found = np.flatnonzero(np.diff(estimate.changes))
     moving = np.cumsum(drive.truth["vx"] > 1.0) * drive.dt
@@ -140,7 +140,7 @@ def score(run: Run) -> Score:
     return Score(
         error=off[-1],
         sd=sd[-1],
-        valid=estimate.valid[-1, : len(PARAMETERS)],
+        valid=estimate.valid[-1, : len(NAMES)],
         time=np.array(times),
         seconds=seconds,
         worst=float((np.abs(off[after, others]) / sd[after, others]).max()),
@@ -149,7 +149,7 @@ def score(run: Run) -> Score:
 
 @cache
 def bound(drive: str, snr: float, duration: float | None) -> Array:
-    """(15,) the Cramer-Rao bound of all parameters together, of `same`, of perfect sensors.
+    """(p,) the Cramer-Rao bound of all parameters together, of `same`, of perfect sensors.
 
     Means of ten samples stand for them, as the observer takes them: a tenth of the memory.
     """
@@ -157,16 +157,16 @@ def bound(drive: str, snr: float, duration: float | None) -> Array:
     n = len(clean) // BLOCK * BLOCK
     columns = [
         sensitivity_at_truth(TWIN, clean, [name], variation())[0, :n]
-        for name in progress(PARAMETERS, "bound", len(PARAMETERS))
+        for name in progress(NAMES, "bound", len(NAMES))
     ]
     means = np.array([c.reshape(-1, BLOCK, len(OUTPUTS)).mean(axis=1) for c in columns])
     sd = noise_sd(clean.measurements, snr) / np.sqrt(BLOCK)
-    return limits(PARAMETERS, means, sd).joint
+    return limits(NAMES, means, sd).joint
 
 
 def _units() -> Array:
-    """(15,) what 100 % is: of a load what it changes, of a scale its nominal value."""
-    return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in PARAMETERS])
+    """(p,) what 100 % is: of a load what it changes, of a scale its nominal value."""
+    return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in NAMES])
 
 
 def rows(
@@ -187,7 +187,7 @@ def rows(
     found: list[Row] = []
     covered = []
     least = bound(drive, snr, duration) if with_bound else None
-    for i, name in enumerate(PARAMETERS):
+    for i, name in enumerate(NAMES):
         one = partial(Row.over_seeds, case=case, quantity=name, estimator="joint")
         errors = np.array([s.error[i] for s in scores])
         sds = np.array([s.sd[i] for s in scores])
@@ -249,7 +249,7 @@ def scenario(name: str) -> Scenario:
             vehicle=Vehicle.load(REAL),
             drive=drive.replace(settings=drive.settings | {"report": report(estimate)}),
             estimate=estimate,
-            parameters=PARAMETERS,
+            parameters=NAMES,
             title=name,
         )
 

@@ -11,7 +11,7 @@ from estimators.offline_fit import offline_fit
 from estimators.staged import staged
 from estimators.unscented import unscented
 from scenarios import mass, pitch, roll_yaw
-from twin import PARAMETERS, Drive, Twin, Vehicle
+from twin import LOAD, SCALES, Drive, Twin, Vehicle
 
 Peer = Callable[[Vehicle, Drive, ArrayLike, float], Estimate]
 """Observes with a vehicle's twin a drive, given its noise (10,) and its first speed [m/s]."""
@@ -51,12 +51,14 @@ def _paper(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) ->
 
 
 def _unscented(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return unscented(vehicle, drive, noise_sd, PARAMETERS, speed=speed)
+    return unscented(vehicle, drive, noise_sd, NAMES, speed=speed)
 
 
 def _least_squares(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return offline_fit(vehicle, drive, noise_sd, PARAMETERS, speed=speed)
+    return offline_fit(vehicle, drive, noise_sd, NAMES, speed=speed)
 
+
+NAMES = (*LOAD, *SCALES)
 
 PEERS: Mapping[str, Peer] = {
     "staged": _staged,

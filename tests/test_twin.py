@@ -34,7 +34,7 @@ def test_names_fit_the_arrays():
     twin = suv()
     assert (twin.inputs, twin.outputs) == (INPUTS, OUTPUTS)
     assert (twin.states, twin.parameters) == (STATES, PARAMETERS)
-    assert (len(INPUTS), len(OUTPUTS), len(STATES), len(PARAMETERS)) == (13, 10, 28, 17)
+    assert (len(INPUTS), len(OUTPUTS), len(STATES), len(PARAMETERS)) == (13, 10, 28, 20)
     assert twin.step(np.zeros(13)).shape == (10,)
     assert twin.read_states().shape == (28,)
     assert twin.tyre_forces().shape == (4, len(TYRE_OUTPUTS))
@@ -164,7 +164,7 @@ def test_input_of_another_shape_is_refused(shape):
     ("method", "size"),
     [
         ("correct", 28),
-        ("set_parameters", 17),
+        ("set_parameters", 20),
     ],
 )
 def test_corrections_and_parameters_are_finite_numbers_of_the_right_shape(method, size):
