@@ -432,6 +432,8 @@ def _report(result: Result, json_path: Path | None, text: str | None = None) -> 
 
 def _print_table(result: Result, text: str | None = None) -> None:
     click.echo(f"{result.name} ({result.seconds:.1f} s)\n{text or result.table()}")
+    for sentence in result.settings.get("report", ()):
+        click.echo(sentence)
 
 
 def _save(data: dict[str, Any], json_path: Path | None) -> None:

@@ -72,6 +72,7 @@ class Score:
         valid: whether it is claimed to be known.
         time: until the error is below 10 % of the variation for good [s]; NaN of a scale.
         seconds: of driving until a change of the load was found; NaN: none was.
+        report: what the drive could not tell, in words.
         worst: largest error of a parameter that no change of load touches, over its claimed sd.
     """
 
@@ -81,6 +82,7 @@ class Score:
     time: Array
     seconds: float
     worst: float
+    report: tuple[str, ...]
 
 
 @cache
@@ -123,7 +125,7 @@ def score(run: Run) -> Score:
     """Scores one run."""
     drive, estimate = observe(run)
     off = estimate.parameters[:, : len(NAMES)] - truth(drive)
-    variations = _units()
+    variations = units()
     sd = estimate.sd[:, : len(NAMES)]
     times = [
         settling_time(off[:, i] + variations[i], variations[i], drive.dt)
@@ -143,6 +145,7 @@ def score(run: Run) -> Score:
         valid=estimate.valid[-1, : len(NAMES)],
         time=np.array(times),
         seconds=seconds,
+        report=tuple(report(estimate)),
         worst=float((np.abs(off[after, others]) / sd[after, others]).max()),
     )
 
@@ -164,7 +167,7 @@ def bound(drive: str, snr: float, duration: float | None) -> Array:
     return limits(NAMES, means, sd).joint
 
 
-def _units() -> Array:
+def units() -> Array:
     """(p,) what 100 % is: of a load what it changes, of a scale its nominal value."""
     return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in NAMES])
 
@@ -180,31 +183,48 @@ def rows(
     with_bound: bool = False,
 ) -> list[Row]:
     """All seeds of one drive of one real vehicle; the Cramer-Rao bound takes a minute more."""
+    scores = all_scores(drive, mismatch, snr, seeds, jobs, duration)
+    least = bound(drive, snr, duration) if with_bound else None
+    return rows_of(scores, drive, mismatch, least)
+
+
+def all_scores(
+    drive: str,
+    mismatch: str,
+    snr: float,
+    seeds: Sequence[int],
+    jobs: int,
+    duration: float | None = None,
+) -> list[Score]:
+    """One of each seed."""
     todo = [Run(drive=drive, mismatch=mismatch, snr=snr, seed=s, duration=duration) for s in seeds]
     clean_drive(drive, mismatch, duration)
-    scores = parallel(score, todo, jobs, f"{drive} {mismatch}")
+    return parallel(score, todo, jobs, f"{drive} {mismatch}")
+
+
+def rows_of(scores: list[Score], drive: str, mismatch: str, least: Array | None) -> list[Row]:
+    """The rows of all seeds; least: the Cramer-Rao bound, (p,)."""
     case = f"{drive}, {mismatch}"
     found: list[Row] = []
     covered = []
-    least = bound(drive, snr, duration) if with_bound else None
     for i, name in enumerate(NAMES):
         one = partial(Row.over_seeds, case=case, quantity=name, estimator="joint")
         errors = np.array([s.error[i] for s in scores])
         sds = np.array([s.sd[i] for s in scores])
         covered.append(np.abs(errors) <= 2.0 * sds)
-        limit = None if least is None else float(100.0 * least[i] / _units()[i])
+        limit = None if least is None else float(100.0 * least[i] / units()[i])
         found += [
-            one(100.0 * np.abs(errors) / _units()[i], metric="pct", unit="%", limit=limit),
-            one(100.0 * sds / _units()[i], metric="claimed_sd_pct", unit="%"),
-            _single(case, name, "rmse_over_sd", np.sqrt(np.mean((errors / sds) ** 2)), len(seeds)),
-            _single(case, name, "valid", np.mean([s.valid[i] for s in scores]), len(seeds)),
+            one(100.0 * np.abs(errors) / units()[i], metric="pct", unit="%", limit=limit),
+            one(100.0 * sds / units()[i], metric="claimed_sd_pct", unit="%"),
+            _single(case, name, "rmse_over_sd", np.sqrt(np.mean((errors / sds) ** 2)), len(scores)),
+            _single(case, name, "valid", np.mean([s.valid[i] for s in scores]), len(scores)),
         ]
         if least is not None:
             ratio = np.sqrt(np.mean(errors**2)) / least[i]
-            found.append(_single(case, name, "rms_over_limit", ratio, len(seeds)))
+            found.append(_single(case, name, "rms_over_limit", ratio, len(scores)))
         if name in LOAD and drive != LOAD_CHANGE:
             found.append(one([s.time[i] for s in scores], metric="time_to_10pct", unit="s"))
-    found.append(_single(case, "all", "coverage", np.mean(covered), len(seeds)))
+    found.append(_single(case, "all", "coverage", np.mean(covered), len(scores)))
     if drive == LOAD_CHANGE:
         one = partial(Row.over_seeds, case=case, estimator="joint")
         found += [
@@ -228,12 +248,12 @@ def scenario(name: str) -> Scenario:
     def run(settings: Settings) -> Result:
         start = time.perf_counter()
         duration = None if name == LOAD_CHANGE else settings.duration
-        scored = rows(name, "same", settings.snr, settings.seeds, settings.jobs, duration)
+        scores = all_scores(name, "same", settings.snr, settings.seeds, settings.jobs, duration)
         return Result(
             name=name,
-            settings=asdict(settings),
+            settings=asdict(settings) | {"report": list(scores[0].report)},
             seconds=time.perf_counter() - start,
-            rows=scored,
+            rows=rows_of(scores, name, "same", None),
         )
 
     def timeline(settings: Settings, path: Path) -> None:
