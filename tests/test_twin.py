@@ -12,7 +12,7 @@ from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, TYRE_OUTPUTS, Twin, TwinEr
 DELTAS = np.array(
     [
         *(300.0, -0.2, 0.03, 0.05, 50.0, 400.0, 390.0, 5.0, -20.0, 4.0),
-        *(-0.1, 0.2, 0.3, 0.1, -0.2, 300.0, -200.0),
+        *(-0.1, 0.2, 0.3, 0.1, -0.2, 0.2, -0.1, 0.1, 300.0, -200.0),
     ]
 )
 
