@@ -21,6 +21,9 @@ ADVICE = {
     "drag": "drive fast and let the car coast",
     "spring": "drive bends and over bumps",
     "damper": "drive over bumps, steer to and fro",
+    "relaxation": "steer quickly to and fro",
+    "drive_torque": "accelerate hard, with bends besides",
+    "brake_torque": "brake hard, with bends besides",
 }
 WORDS = {
     "mass": "the mass",
@@ -35,6 +38,9 @@ WORDS = {
     "drag": "the air drag",
     "spring": "the stiffness of the springs",
     "damper": "the dampers",
+    "relaxation": "the relaxation lengths of the tyres",
+    "drive_torque": "the share of the drive torque that reaches the wheels",
+    "brake_torque": "the share of the brake torque that reaches the wheels",
 }
 # From here on two errors go together so far that neither parameter is told apart from the other
 TOGETHER = 0.95

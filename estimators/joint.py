@@ -40,7 +40,8 @@ PRIOR_SD = {
     **{"Jxx": 150.0, "Jyy": 900.0, "Jzz": 900.0},
     **{"Jxy": 30.0, "Jxz": 80.0, "Jyz": 30.0},
     **dict.fromkeys(SCALES, 0.15),
-    "drag": 0.3,
+    **dict.fromkeys(("drag", "relaxation"), 0.3),
+    **dict.fromkeys(("drive_torque", "brake_torque"), 0.03),
 }
 # A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m]
 FAULT_SD = dict(
@@ -78,6 +79,8 @@ class JointSettings:
         valid_share: of its prior sd that an estimate's sd has to be below to count as valid.
         drift: share of its prior sd that a parameter may wander over a second.
         step: largest share of its prior sd by which an estimate moves in a block.
+        reach: share of its prior sd that an estimate may be from its twins before they follow.
+        wait: seconds after that in which the twins settle and nothing is corrected.
         hold_off: seconds before the first correction.
         block: samples per correction.
         speed_gain: draws each twin's speed to the measured wheel speeds [1/s].
@@ -99,6 +102,8 @@ class JointSettings:
     valid_share: float = 0.2
     drift: float = 0.0003
     step: float = 0.1
+    reach: float = 0.1
+    wait: float = 0.3
     hold_off: float = 1.0
     block: int = 10
     speed_gain: float = 0.5
@@ -171,6 +176,8 @@ class JointObserver:
             parameter=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             offset=np.array([OFFSETS[name] for name in names]),
             fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
+            reach=settings.reach * self._prior[: len(names)],
+            wait=round(settings.wait / (settings.block * self.dt)),
             step_limit=settings.step * self._prior,
             drift=(settings.drift * self._prior) ** 2,
             noise=settings.noise_factor * np.asarray(noise_sd, dtype=np.float64) ** 2,
@@ -195,7 +202,7 @@ class JointObserver:
         n, p, q = len(self.fleet), len(PARAMETERS), self._prior.size
         ny, nx = len(OUTPUTS), len(first.states)
         self._memory = Memory(
-            theta=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
+            theta=np.zeros(p), estimate=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
             present=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
             excitation=np.zeros((2, 4)),
@@ -204,7 +211,7 @@ class JointObserver:
             doubt=np.zeros(ny), window=np.zeros((3, ny)), window_h=np.zeros((ny, q)),
             recent=np.zeros((q, q)), score=np.zeros(q), kept=np.zeros(q),
             kept_covariance=np.zeros((q, q)), kept_doubt=np.zeros(ny),
-            blocks=np.zeros(2, dtype=np.int64), changes=np.zeros(1, dtype=np.int64),
+            blocks=np.zeros(3, dtype=np.int64), changes=np.zeros(1, dtype=np.int64),
         )  # fmt: skip
         self.reset(0.0)
 
@@ -230,6 +237,7 @@ class JointObserver:
                     f"joint: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
                 )
             memory.theta[PARAMETERS.index(name)] = value
+        memory.estimate[:] = memory.theta
         memory.z[: self._setup.parameter.size] = memory.theta[self._setup.parameter]
         memory.covariance[:] = np.diag(self._prior**2)
         memory.doubt[:] = self.settings.doubt
@@ -258,7 +266,7 @@ class JointObserver:
         joint_kernel.update(self.fleet.cars, self._setup, self._memory, u, y)
         for twin in self.fleet.twins:
             twin.check()
-        return self._memory.theta.copy()
+        return self._memory.estimate.copy()
 
     def snapshot(self) -> JointSnapshot:
         """Everything that decides the future; a run from it is bit-exact."""

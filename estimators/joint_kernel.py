@@ -31,6 +31,7 @@ from estimators.joint_memory import (
     SPIN,
     TOTAL,
     VX,
+    WAIT,
     WATCH,
     WHEEL_SPEED,
 )
@@ -132,6 +133,11 @@ def _innovation(setup, memory, h):
             for j in range(IMU):
                 if variance[j] < ABSENT:
                     r[j] -= h[j, i] * memory.z[i]
+    for i in range(setup.parameter.size):
+        ahead = memory.z[i] - memory.theta[setup.parameter[i]]
+        for j in range(NY):
+            if variance[j] < ABSENT:
+                r[j] -= h[j, i] * ahead
     return r, variance
 
 
@@ -162,14 +168,18 @@ def _estimate(cars, setup, memory):
     q, covariance = memory.z.size, memory.covariance
     seconds = setup.block * setup.dt
     excited = _is_excited(setup, memory)
+    if memory.blocks[WAIT] > 0:
+        memory.blocks[WAIT] -= 1
+        excited = False
     if excited and memory.clock[BLOCKS] > setup.hold_off:
         memory.blocks[DRIVEN] += 1
         if memory.blocks[WATCH] > 0:
             memory.blocks[WATCH] -= 1
             if load_changed(setup, memory, h, r):
-                before = memory.z.copy()
                 forget_load(setup, memory)
-                _move(cars, setup, memory, memory.z - before)
+                for i in range(setup.parameter.size):
+                    memory.estimate[setup.parameter[i]] = memory.z[i]
+                _move(cars, setup, memory)
                 return
         hp = h @ covariance
         s = hp @ h.T
@@ -190,13 +200,12 @@ def _estimate(cars, setup, memory):
             informed[j] = h[j] / variance[j]
         covariance[:] = rest @ covariance @ rest.T + scaled @ gain.T
         memory.information[:] += h.T @ informed
-        before = memory.z.copy()
         memory.z[:] += share * move
         for i in range(setup.parameter.size, q):
             if setup.fault[i - setup.parameter.size] == DELAY:
                 memory.z[i] = min(max(memory.z[i], -setup.dt), (RING - 2) * setup.dt)
-        project(memory.z, covariance, setup.parameter, setup.nominal, memory.theta)
-        _move(cars, setup, memory, memory.z - before)
+        project(memory.z, covariance, setup.parameter, setup.nominal, memory.estimate)
+        _move_if_far(cars, setup, memory)
     else:
         keep(setup, memory)
     for i in range(q):
@@ -204,9 +213,23 @@ def _estimate(cars, setup, memory):
 
 
 @njit(cache=True, nogil=True)
-def _move(cars, setup, memory, d):
-    """Steps the parameters by d (q,) and every twin's states by S d."""
+def _move_if_far(cars, setup, memory):
+    """Lets the twins follow once an estimate has left the range in which they tell H."""
+    for i in range(setup.parameter.size):
+        ahead = memory.z[i] - memory.theta[setup.parameter[i]]
+        if abs(ahead) > setup.reach[i]:
+            _move(cars, setup, memory)
+            memory.blocks[WAIT] = setup.wait
+            return
+
+
+@njit(cache=True, nogil=True)
+def _move(cars, setup, memory):
+    """Steps the twins' parameters to the estimates and every twin's states by S d."""
     n, p = cars.size, setup.parameter.size
+    d = np.zeros(p)
+    for i in range(p):
+        d[i] = memory.z[i] - memory.theta[setup.parameter[i]]
     states, dx, theta = memory.states, memory.dx, memory.theta
     for i in range(n):
         read_states(cars[i], states[i])
@@ -261,7 +284,7 @@ def run(cars, setup, memory, inputs, measurements, log):
     for k in range(inputs.shape[0]):
         read_states(cars[0], log.states[k])
         update(cars, setup, memory, inputs[k], measurements[k])
-        log.parameters[k] = memory.theta
+        log.parameters[k] = memory.estimate
         log.outputs[k] = memory.out[0]
         log.extended[k] = cars[0].tyre_output
         for i in range(memory.z.size):

@@ -20,7 +20,8 @@ ABSENT = 1e12  # variance of a channel that has no measurement
 # Wheels slower than this [rad/s], 1 m/s, tell nothing: the instant of a stop is a jump
 LEAST_SPIN = 3.0
 STANDING = 0.5  # and slower than this the car stands; chosen
-WATCH, DRIVEN = 0, 1  # blocks: left to look for a change of the load; of exciting driving so far
+# Blocks: left to look for a change of the load; of exciting driving so far; left to wait
+WATCH, DRIVEN, WAIT = 0, 1, 2
 SAMPLES, BLOCKS, TOTAL = 0, 1, 2  # what the clock counts: of the block, blocks, of all
 # What is estimated of the sensors besides parameters: biases, delay, and the place of the IMU
 DELAY, POSITION = IMU, IMU + 1
@@ -35,6 +36,8 @@ class Setup(NamedTuple):
     parameter: Indices  # (p,) of each among the twin's
     offset: Array  # (p,) of its twin
     fault: Indices  # (q - p,) of the sensors: channel of a bias, DELAY, POSITION + axis
+    reach: Array  # (p,) from their twins that estimates may be before these follow
+    wait: int  # blocks after that
     step_limit: Array  # (q,) the most an estimate may move in a block
     drift: Array  # (q,) variance per second
     noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
@@ -63,6 +66,7 @@ class Memory(NamedTuple):
     """What the observer keeps from sample to sample, beside its twins."""
 
     theta: Array  # (np,) parameters of twin 0
+    estimate: Array  # (np,) parameters estimated
     z: Array  # (q,) estimates
     covariance: Array  # (q, q)
     out: Array  # (n, ny) the twins' last outputs
@@ -85,7 +89,7 @@ class Memory(NamedTuple):
     kept: Array  # (q,) estimates at the last standstill
     kept_covariance: Array  # (q, q)
     kept_doubt: Array  # (ny,)
-    blocks: Indices  # (2,)
+    blocks: Indices  # (3,)
     changes: Indices  # (1,) of the load, so far
     clock: Indices  # (3,)
 

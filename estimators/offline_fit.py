@@ -22,7 +22,7 @@ from estimators.joint import OFFSETS, PRIOR_SD
 from estimators.observer import Observer
 from estimators.parameter_estimate import ParameterEstimate
 from estimators.unscented import BIAS_SD
-from twin import OUTPUTS, PARAMETERS, Drive, Twin, TwinError, Vehicle
+from twin import LOAD, OUTPUTS, PARAMETERS, SCALES, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def offline_fit(
     vehicle: Vehicle,
     drive: Drive,
     noise_sd: ArrayLike,
-    parameters: Sequence[str] = PARAMETERS,
+    parameters: Sequence[str] = (*LOAD, *SCALES),
     *,
     speed: float,
     prior_sd: Mapping[str, float] | None = None,

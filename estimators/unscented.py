@@ -15,7 +15,18 @@ from estimators.joint import PRIOR_SD
 from estimators.parameter_estimate import ParameterEstimate
 from estimators.side_by_side import new_block
 from estimators.unscented_kernel import Log, Memory, Setup
-from twin import OUTPUTS, PARAMETERS, STATES, Drive, Fleet, TwinError, Vehicle, check_inputs
+from twin import (
+    LOAD,
+    OUTPUTS,
+    PARAMETERS,
+    SCALES,
+    STATES,
+    Drive,
+    Fleet,
+    TwinError,
+    Vehicle,
+    check_inputs,
+)
 
 Array = NDArray[np.float64]
 
@@ -35,7 +46,7 @@ def unscented(
     vehicle: Vehicle,
     drive: Drive,
     noise_sd: ArrayLike,
-    parameters: Sequence[str] = PARAMETERS,
+    parameters: Sequence[str] = (*LOAD, *SCALES),
     *,
     speed: float,
 ) -> ParameterEstimate:

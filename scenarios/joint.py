@@ -28,7 +28,7 @@ from scenarios.result import Result, Row
 from scenarios.sensors import Sensors
 from scenarios.study import REAL, TWIN, variation
 from scenarios.vehicles import SUV_LOADS
-from twin import LOAD, OUTPUTS, SCALES, Drive, Vehicle, noise_sd, parameter_deltas
+from twin import LOAD, OUTPUTS, SCALES, Drive, Vehicle, noise_sd
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ MANOEUVRES: dict[str, Callable[[float | None], Manoeuvre]] = {
 LOAD_CHANGE = "load-change"
 GET_OUT = ("rear_left_passenger", "rear_right_passenger")  # 145 kg
 BLOCK = 10  # samples
-ESTIMATED = (*LOAD, *SCALES)  # the first of `twin.PARAMETERS`; forces on the axles are none of it
+NAMES = (*LOAD, *SCALES)  # estimated in all of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """Of one run, each of `ESTIMATED`: shape (15,).
+    """Of one run, each of `NAMES`.
 
     Attributes:
         error: at the end, estimate less truth.
@@ -73,6 +73,7 @@ class Score:
         valid: whether it is claimed to be known.
         time: until the error is below 10 % of the variation for good [s]; NaN of a scale.
         seconds: of driving until a change of the load was found; NaN: none was.
+        report: what the drive could not tell, in words.
         worst: largest error of a parameter that no change of load touches, over its claimed sd.
     """
 
@@ -82,6 +83,7 @@ class Score:
     time: Array
     seconds: float
     worst: float
+    report: tuple[str, ...]
 
 
 @cache
@@ -98,13 +100,12 @@ def clean_drive(drive: str, mismatch: str, duration: float | None) -> Drive:
 
 
 def truth(drive: Drive) -> Array:
-    """(N, 15) deltas of the real vehicle from the twin's, of `ESTIMATED`."""
+    """(N, p) deltas of the real vehicle from the twin's, of `NAMES`."""
     nominal = Vehicle.load(TWIN).chassis()
-    zero = parameter_deltas(nominal, nominal)[: len(ESTIMATED)]
-    values = np.column_stack([drive.truth[name] for name in ESTIMATED])
+    values = np.column_stack([drive.truth[name] for name in NAMES])
     inertia = nominal.inertia[[0, 0, 1], [1, 2, 2]]
     base = [nominal.mass, *nominal.cm, *np.diag(nominal.inertia), *inertia, *(1.0 for _ in SCALES)]
-    return values - np.array(base) + zero
+    return values - np.array(base)
 
 
 def faults(sensors: Sensors) -> dict[str, float]:
@@ -130,14 +131,14 @@ def observe(
 def score(run: Run) -> Score:
     """Scores one run."""
     drive, estimate = observe(run)
-    off = estimate.parameters[:, : len(ESTIMATED)] - truth(drive)
-    variations = _units()
-    sd = estimate.sd[:, : len(ESTIMATED)]
+    off = estimate.parameters[:, : len(NAMES)] - truth(drive)
+    variations = units()
+    sd = estimate.sd[:, : len(NAMES)]
     times = [
         settling_time(off[:, i] + variations[i], variations[i], drive.dt)
         if name in LOAD
         else np.nan
-        for i, name in enumerate(ESTIMATED)
+        for i, name in enumerate(NAMES)
     ]
     found = np.flatnonzero(np.diff(estimate.changes))
     moving = np.cumsum(drive.truth["vx"] > 1.0) * drive.dt
@@ -148,16 +149,17 @@ def score(run: Run) -> Score:
     return Score(
         error=off[-1],
         sd=sd[-1],
-        valid=estimate.valid[-1, : len(ESTIMATED)],
+        valid=estimate.valid[-1, : len(NAMES)],
         time=np.array(times),
         seconds=seconds,
+        report=tuple(report(estimate)),
         worst=float((np.abs(off[after, others]) / sd[after, others]).max()),
     )
 
 
 @cache
 def bound(drive: str, snr: float, duration: float | None) -> Array:
-    """(15,) the Cramer-Rao bound of all parameters together, of `same`, of perfect sensors.
+    """(p,) the Cramer-Rao bound of all parameters together, of `same`, of perfect sensors.
 
     Means of ten samples stand for them, as the observer takes them: a tenth of the memory.
     """
@@ -165,16 +167,16 @@ def bound(drive: str, snr: float, duration: float | None) -> Array:
     n = len(clean) // BLOCK * BLOCK
     columns = [
         sensitivity_at_truth(TWIN, clean, [name], variation())[0, :n]
-        for name in progress(ESTIMATED, "bound", len(ESTIMATED))
+        for name in progress(NAMES, "bound", len(NAMES))
     ]
     means = np.array([c.reshape(-1, BLOCK, len(OUTPUTS)).mean(axis=1) for c in columns])
     sd = noise_sd(clean.measurements, snr) / np.sqrt(BLOCK)
-    return limits(ESTIMATED, means, sd).joint
+    return limits(NAMES, means, sd).joint
 
 
-def _units() -> Array:
-    """(15,) what 100 % is: of a load what it changes, of a scale its nominal value."""
-    return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in ESTIMATED])
+def units() -> Array:
+    """(p,) what 100 % is: of a load what it changes, of a scale its nominal value."""
+    return np.array([abs(variation()[n]) if n in LOAD else 1.0 for n in NAMES])
 
 
 def rows(
@@ -188,31 +190,48 @@ def rows(
     with_bound: bool = False,
 ) -> list[Row]:
     """All seeds of one drive of one real vehicle; the Cramer-Rao bound takes a minute more."""
+    scores = all_scores(drive, mismatch, snr, seeds, jobs, duration)
+    least = bound(drive, snr, duration) if with_bound else None
+    return rows_of(scores, drive, mismatch, least)
+
+
+def all_scores(
+    drive: str,
+    mismatch: str,
+    snr: float,
+    seeds: Sequence[int],
+    jobs: int,
+    duration: float | None = None,
+) -> list[Score]:
+    """One of each seed."""
     todo = [Run(drive=drive, mismatch=mismatch, snr=snr, seed=s, duration=duration) for s in seeds]
     clean_drive(drive, mismatch, duration)
-    scores = parallel(score, todo, jobs, f"{drive} {mismatch}")
+    return parallel(score, todo, jobs, f"{drive} {mismatch}")
+
+
+def rows_of(scores: list[Score], drive: str, mismatch: str, least: Array | None) -> list[Row]:
+    """The rows of all seeds; least: the Cramer-Rao bound, (p,)."""
     case = f"{drive}, {mismatch}"
     found: list[Row] = []
     covered = []
-    least = bound(drive, snr, duration) if with_bound else None
-    for i, name in enumerate(ESTIMATED):
+    for i, name in enumerate(NAMES):
         one = partial(Row.over_seeds, case=case, quantity=name, estimator="joint")
         errors = np.array([s.error[i] for s in scores])
         sds = np.array([s.sd[i] for s in scores])
         covered.append(np.abs(errors) <= 2.0 * sds)
-        limit = None if least is None else float(100.0 * least[i] / _units()[i])
+        limit = None if least is None else float(100.0 * least[i] / units()[i])
         found += [
-            one(100.0 * np.abs(errors) / _units()[i], metric="pct", unit="%", limit=limit),
-            one(100.0 * sds / _units()[i], metric="claimed_sd_pct", unit="%"),
-            _single(case, name, "rmse_over_sd", np.sqrt(np.mean((errors / sds) ** 2)), len(seeds)),
-            _single(case, name, "valid", np.mean([s.valid[i] for s in scores]), len(seeds)),
+            one(100.0 * np.abs(errors) / units()[i], metric="pct", unit="%", limit=limit),
+            one(100.0 * sds / units()[i], metric="claimed_sd_pct", unit="%"),
+            _single(case, name, "rmse_over_sd", np.sqrt(np.mean((errors / sds) ** 2)), len(scores)),
+            _single(case, name, "valid", np.mean([s.valid[i] for s in scores]), len(scores)),
         ]
         if least is not None:
             ratio = np.sqrt(np.mean(errors**2)) / least[i]
-            found.append(_single(case, name, "rms_over_limit", ratio, len(seeds)))
+            found.append(_single(case, name, "rms_over_limit", ratio, len(scores)))
         if name in LOAD and drive != LOAD_CHANGE:
             found.append(one([s.time[i] for s in scores], metric="time_to_10pct", unit="s"))
-    found.append(_single(case, "all", "coverage", np.mean(covered), len(seeds)))
+    found.append(_single(case, "all", "coverage", np.mean(covered), len(scores)))
     if drive == LOAD_CHANGE:
         one = partial(Row.over_seeds, case=case, estimator="joint")
         found += [
@@ -236,12 +255,12 @@ def scenario(name: str) -> Scenario:
     def run(settings: Settings) -> Result:
         start = time.perf_counter()
         duration = None if name == LOAD_CHANGE else settings.duration
-        scored = rows(name, "same", settings.snr, settings.seeds, settings.jobs, duration)
+        scores = all_scores(name, "same", settings.snr, settings.seeds, settings.jobs, duration)
         return Result(
             name=name,
-            settings=asdict(settings),
+            settings=asdict(settings) | {"report": list(scores[0].report)},
             seconds=time.perf_counter() - start,
-            rows=scored,
+            rows=rows_of(scores, name, "same", None),
         )
 
     def timeline(settings: Settings, path: Path) -> None:

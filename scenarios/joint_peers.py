@@ -13,7 +13,7 @@ from estimators.unscented import unscented
 from scenarios import mass, pitch, roll_yaw
 from twin import LOAD, SCALES, Drive, Twin, Vehicle
 
-ESTIMATED = (*LOAD, *SCALES)
+NAMES = (*LOAD, *SCALES)
 Peer = Callable[[Vehicle, Drive, ArrayLike, float], Estimate]
 """Observes with a vehicle's twin a drive, given its noise (10,) and its first speed [m/s]."""
 
@@ -52,12 +52,14 @@ def _paper(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) ->
 
 
 def _unscented(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return unscented(vehicle, drive, noise_sd, ESTIMATED, speed=speed)
+    return unscented(vehicle, drive, noise_sd, NAMES, speed=speed)
 
 
 def _least_squares(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return offline_fit(vehicle, drive, noise_sd, ESTIMATED, speed=speed)
+    return offline_fit(vehicle, drive, noise_sd, NAMES, speed=speed)
 
+
+NAMES = (*LOAD, *SCALES)
 
 PEERS: Mapping[str, Peer] = {
     "staged": _staged,

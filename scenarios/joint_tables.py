@@ -9,7 +9,8 @@ import numpy as np
 
 from estimators.joint import JointObserver, JointSettings
 from estimators.score import rms_pct, settling_time
-from scenarios import joint
+from scenarios import joint, joint_peer_rows
+from scenarios.joint_peers import PEERS
 from scenarios.mismatch import MISMATCHES
 from scenarios.progress import parallel
 from scenarios.result import Result, Row
@@ -17,6 +18,7 @@ from scenarios.study import TWIN, Case, Run, Study, find, noisy_drive, real_driv
 from twin import LOAD, OUTPUTS, Vehicle
 
 SNR = 10.0  # dB, as in TiL
+COMPARED = (("mixed", "same"), ("mixed", "all-scales"))  # by all peers
 
 
 def everything(seeds: int, jobs: int, out: Path) -> Result:
@@ -26,15 +28,22 @@ def everything(seeds: int, jobs: int, out: Path) -> Result:
     bounded = [("mixed", "same"), ("hard", "same")]
     cases += [("hard", "same"), ("straight", "same"), ("straight", "imu-bias")]
     cases += [("urban", "all-scales"), (joint.LOAD_CHANGE, "same")]
+    # the others look at 37 twins, or through the whole drive many times over
+    peers = [("staged", case) for case in cases if case[0] != joint.LOAD_CHANGE]
+    peers += [(p, case) for p in PEERS if p != "staged" for case in COMPARED]
+    found = [
+        row
+        for case in cases
+        for row in joint.rows(*case, SNR, range(seeds), jobs, with_bound=case in bounded)
+    ]
+    found += [
+        row for p, case in peers for row in joint_peer_rows.rows(p, *case, SNR, range(seeds), jobs)
+    ]
     return Result(
         name="til-joint-all",
         settings={"seeds": seeds, "snr": SNR},
         seconds=time.perf_counter() - start,
-        rows=[
-            row
-            for case in cases
-            for row in joint.rows(*case, SNR, range(seeds), jobs, with_bound=case in bounded)
-        ],
+        rows=found,
     )
 
 

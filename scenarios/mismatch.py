@@ -116,4 +116,7 @@ def real_drive(clean: Drive, mismatch: Mismatch, snr: float, rng: np.random.Gene
     inputs = clean.inputs.copy()
     inputs[:, DRIVE] /= mismatch.drive
     inputs[:, BRAKE] /= mismatch.brake
-    return measured(clean.replace(inputs=inputs), mismatch.sensors, snr, rng)
+    shares = {"drive_torque": mismatch.drive, "brake_torque": mismatch.brake}
+    truth = dict(clean.truth)
+    truth |= {name: truth[name] * share for name, share in shares.items() if name in truth}
+    return measured(clean.replace(inputs=inputs, truth=truth), mismatch.sensors, snr, rng)

@@ -19,6 +19,8 @@ def report(result: Result, json_path: Path | None, text: str | None = None) -> N
 def print_table(result: Result, text: str | None = None) -> None:
     """Shows the text, or the rows if there is none, under the result's name."""
     click.echo(f"{result.name} ({result.seconds:.1f} s)\n{text or result.table()}")
+    for sentence in result.settings.get("report", ()):
+        click.echo(sentence)
 
 
 def save(data: dict[str, Any], json_path: Path | None) -> None:

@@ -40,7 +40,8 @@ _SIGNAL = {
     **{"Jxx": "roll_rate", "Jyy": "pitch_rate", "Jzz": "yaw_rate"},
     **{"Jxy": "pitch_rate", "Jxz": "yaw_rate", "Jyz": "pitch_rate"},
     **{"tyre_friction": "ay", "cornering_stiffness": "ay", "drag": "ax"},
-    **{"spring": "roll_rate", "damper": "roll_rate"},
+    **{"spring": "roll_rate", "damper": "roll_rate", "relaxation": "yaw_rate"},
+    **{"drive_torque": "ax", "brake_torque": "ax"},
     **dict.fromkeys(twin.FORCES, "ay"),
 }
 

@@ -4,7 +4,7 @@ import pytest
 from estimators.identifiability import report
 from estimators.joint import JointObserver, JointSettings
 from scenarios import joint
-from scenarios.joint import ESTIMATED, Run, clean_drive, truth
+from scenarios.joint import Run, clean_drive, truth
 from scenarios.study import variation
 from twin import LOAD, OUTPUTS, PARAMETERS, Fleet, Twin, TwinError, Vehicle, noise_sd
 from twin.kernel import read_states, step
@@ -49,8 +49,9 @@ def test_cars_of_a_fleet_are_those_of_its_twins():
 
 def test_parameters_at_the_truth_stay_there(drive):
     run = observer(drive, at=variation()).run(drive)
-    off = np.abs(run.parameters[-1, : len(ESTIMATED)] - truth(drive)[-1])
-    assert (off < 0.05 * run.sd[-1, : len(ESTIMATED)]).all()
+    p = len(joint.NAMES)
+    off = np.abs(run.parameters[-1, :p] - truth(drive)[-1])
+    assert (off < 0.05 * run.sd[-1, :p]).all()
 
 
 def test_the_load_is_found_without_noise(drive):
@@ -122,7 +123,7 @@ def test_steady_straight_drive_changes_nothing_and_tells_nothing():
         "this drive cannot tell the yaw inertia (100 % of what was unknown still is): "
         in " ".join(told)
     )
-    assert len(told) >= len(ESTIMATED)
+    assert len(told) >= len(joint.NAMES)
 
 
 def test_delay_and_bias_of_the_sensors_are_found(drive):
@@ -158,7 +159,7 @@ def test_noise_of_nothing_is_refused():
 def test_rows_tell_error_claim_and_validity_of_every_parameter():
     rows = joint.rows("mixed", "all-scales", 10.0, [0], 1, 3.0)
     found = {(row.quantity, row.metric): row.median for row in rows}
-    for name in ESTIMATED:
+    for name in joint.NAMES:
         error, sd = found[name, "pct"], found[name, "claimed_sd_pct"]
         assert found[name, "rmse_over_sd"] == pytest.approx(error / sd)
         assert found[name, "valid"] in (0.0, 1.0)

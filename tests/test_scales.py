@@ -11,13 +11,18 @@ FACTORS = {
     "drag": 1.3,
     "spring": 1.15,
     "damper": 0.8,
+    "relaxation": 1.3,
+    "drive_torque": 0.9,
+    "brake_torque": 1.1,
 }
 
 
 def lively():
     """A second of steering and driving."""
     t = times(1.0)
-    return inputs(1.0, steering=0.8 * np.sin(6.0 * t), drive=300.0 * np.sin(9.0 * t)[:, None])
+    return inputs(
+        1.0, steering=0.8 * np.sin(6.0 * t), drive=300.0 * np.sin(9.0 * t)[:, None], brake=100.0
+    )
 
 
 def deltas(**named):

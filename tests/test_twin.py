@@ -12,7 +12,7 @@ from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, TYRE_OUTPUTS, Twin, TwinEr
 DELTAS = np.array(
     [
         *(300.0, -0.2, 0.03, 0.05, 50.0, 400.0, 390.0, 5.0, -20.0, 4.0),
-        *(-0.1, 0.2, 0.3, 0.1, -0.2, 300.0, -200.0),
+        *(-0.1, 0.2, 0.3, 0.1, -0.2, 0.2, -0.1, 0.1, 300.0, -200.0),
     ]
 )
 
@@ -34,7 +34,7 @@ def test_names_fit_the_arrays():
     twin = suv()
     assert (twin.inputs, twin.outputs) == (INPUTS, OUTPUTS)
     assert (twin.states, twin.parameters) == (STATES, PARAMETERS)
-    assert (len(INPUTS), len(OUTPUTS), len(STATES), len(PARAMETERS)) == (13, 10, 28, 17)
+    assert (len(INPUTS), len(OUTPUTS), len(STATES), len(PARAMETERS)) == (13, 10, 28, 20)
     assert twin.step(np.zeros(13)).shape == (10,)
     assert twin.read_states().shape == (28,)
     assert twin.tyre_forces().shape == (4, len(TYRE_OUTPUTS))
@@ -85,10 +85,10 @@ def test_restore_puts_the_parameters_back():
 def test_replay_is_bit_exact_after_the_parameters_wandered():
     twin = suv(20.0)
     for mass in np.linspace(-399.7, 803.3, 20):
-        twin.set_parameters([mass, *[0.0] * 16])
+        twin.set_parameters([mass, *[0.0] * 19])
         start = twin.snapshot()
         first = run(twin, manoeuvre(0.02)).states
-        twin.set_parameters([0.3 * mass + 1.0, *[0.0] * 16])
+        twin.set_parameters([0.3 * mass + 1.0, *[0.0] * 19])
         twin.restore(start)
         np.testing.assert_array_equal(run(twin, manoeuvre(0.02)).states, first)
 
@@ -164,7 +164,7 @@ def test_input_of_another_shape_is_refused(shape):
     ("method", "size"),
     [
         ("correct", 28),
-        ("set_parameters", 17),
+        ("set_parameters", 20),
     ],
 )
 def test_corrections_and_parameters_are_finite_numbers_of_the_right_shape(method, size):
@@ -200,6 +200,6 @@ def run_python(twin):
 
 def test_car_too_heavy_for_its_springs_does_not_settle():
     twin = suv()
-    twin.set_parameters([1e6, *[0.0] * 16])
+    twin.set_parameters([1e6, *[0.0] * 19])
     with pytest.raises(TwinError, match=r"does not settle on its wheels at 0\.0 m/s"):
         twin.reset()

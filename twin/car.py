@@ -18,8 +18,8 @@ MODEL_VIEWS = (
 )
 AXLES = ("front", "rear")
 _PER_WHEEL = (len(WHEELS),)
-# Scaling factors of a tyre that parameters change: friction, then cornering stiffness
-SCALED_TYRE = ("lmux", "lmuy", "lky")
+# Scaling factors of a tyre that parameters change: friction, cornering stiffness, relaxation
+SCALED_TYRE = ("lmux", "lmuy", "lky", "lsgkp", "lsgal")
 
 CAR_DTYPE = np.dtype(
     [
@@ -41,6 +41,7 @@ CAR_DTYPE = np.dtype(
         ("steering_ratio", np.float64),
         ("ackermann", np.float64),
         ("drag_area", np.float64),  # [m2], in force
+        ("torque_share", np.float64, (2,)),  # of drive and brake torque, what reaches the wheels
         ("lift_area", np.float64, (len(AXLES),)),  # [m2], positive pushes down
         ("axle", np.float64, (len(AXLES),)),  # x of its hubs in the chassis frame [m]
         ("spin_inertia", np.float64, _PER_WHEEL),  # of each wheel about its axis [kg m2]
@@ -49,6 +50,7 @@ CAR_DTYPE = np.dtype(
         # of each wheel what `twin.scales` scales, as the files have it
         ("nominal_tyre", np.float64, (len(SCALED_TYRE), *_PER_WHEEL)),
         ("nominal_drag_area", np.float64),
+        ("nominal_torque_share", np.float64, (2,)),
         ("nominal_stiffness", np.float64, _PER_WHEEL),  # [N/m]
         ("nominal_spring", np.float64, _PER_WHEEL),  # free position [m]
         ("nominal_bar", np.float64, (len(AXLES),)),  # [N/m]

@@ -46,8 +46,12 @@ STATES = (
 LOAD = ("mass", "cm_x", "cm_y", "cm_z", "Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz")
 # What else of the car a model gets wrong, each as the relative delta from the nominal value: peak
 # friction and cornering stiffness of the tyres, air drag, suspension springs with anti-roll bars
-# (at the nominal ride height), dampers
-SCALES = ("tyre_friction", "cornering_stiffness", "drag", "spring", "damper")
+# (at the nominal ride height), dampers, relaxation lengths of the tyres, and what reaches the
+# wheels of the known torques
+SCALES = (
+    *("tyre_friction", "cornering_stiffness", "drag", "spring", "damper", "relaxation"),
+    *("drive_torque", "brake_torque"),
+)
 # Lateral forces [N] on the axles, at the road, that its tyres do not account for; to the left
 FORCES = ("axle_force_front", "axle_force_rear")
 PARAMETERS = (*LOAD, *SCALES, *FORCES)

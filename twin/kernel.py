@@ -70,9 +70,9 @@ def set_parameters(car, p):
 
     Args:
         car: the car.
-        p: (17,) deltas from the nominal car, `twin.channels.PARAMETERS`: mass [kg], CM [m], inertia
-            tensor about the new CM [kg m2], relative ones of tyres, drag, springs and dampers, and
-            lateral forces on the axles [N].
+        p: (20,) deltas from the nominal car, `twin.channels.PARAMETERS`: mass [kg], CM [m], inertia
+            tensor about the new CM [kg m2], relative ones of tyres, drag, springs, dampers and
+            torques, and lateral forces on the axles [N].
             On return it holds what was set: the mass has a floor, the tensor is one that a rigid
             body can have, scales stay within `twin.scales`' bounds.
     """

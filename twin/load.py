@@ -88,7 +88,7 @@ def steiner(mass: float, offset: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def parameter_deltas(nominal: RigidBody, changed: RigidBody) -> NDArray[np.float64]:
-    """(17,) change of `twin.PARAMETERS` [kg, m, kg m2], each inertia about its body's own CM.
+    """(20,) change of `twin.PARAMETERS` [kg, m, kg m2], each inertia about its body's own CM.
 
     A load changes no scale and pushes no axle: those are zero.
     """

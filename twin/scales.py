@@ -1,4 +1,4 @@
-"""Scales what a model of a car gets wrong besides its load: tyres, drag, springs, dampers.
+"""Scales what a model of a car gets wrong besides its load: tyres, drag, springs, torques.
 
 `Vehicle.scaled` makes another car of it ("the real vehicle"); `set_scales` does the same to a twin
 while it drives. Springs keep the nominal ride height: a stiffer one is the shorter by as much.
@@ -19,8 +19,8 @@ from twin.lanes import pointer
 
 # Beyond these factors it is no longer the same car
 LEAST_SCALE, LARGEST_SCALE = 0.3, 3.0
-# Coefficients of a .tir file behind each name; those after the first two are no parameters of a
-# running twin, but a real vehicle has others than its files say
+# Coefficients of a .tir file behind each name; those after the first three are no parameters of
+# a running twin, but a real vehicle has others than its files say
 TYRE_SCALES = {
     "tyre_friction": ("lmux", "lmuy"),
     "cornering_stiffness": ("lky",),
@@ -38,10 +38,14 @@ VEHICLE_SCALES = (
     *(f"{axle}{name}" for name in TYRE_SCALES for axle in _TYRES if axle),
     *("front_anti_roll", "rear_anti_roll", "steering_ratio"),
 )
+# Shares of the torques, `Car.torque_share`
+TORQUES = ("drive_torque", "brake_torque")
 BARS = tuple(f"anti_roll_{axle}" for axle in AXLES)
 
-_FRICTION, _CORNERING, _DRAG, _SPRING, _DAMPER = range(len(LOAD), len(LOAD) + len(SCALES))
-_LMUX, _LMUY, _LKY = (NAMES.index(name) for name in SCALED_TYRE)
+_FRICTION, _CORNERING, _DRAG, _SPRING, _DAMPER, _RELAXATION, _DRIVE, _BRAKE = range(
+    len(LOAD), len(LOAD) + len(SCALES)
+)
+_LMUX, _LMUY, _LKY, _LSGKP, _LSGAL = (NAMES.index(name) for name in SCALED_TYRE)
 
 
 def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
@@ -80,7 +84,7 @@ def set_scales(car, p):
     """The part of `twin.kernel.set_parameters` that is no load."""
     now = car.parameters
     changed = False
-    for i in range(_FRICTION, _DAMPER + 1):
+    for i in range(_FRICTION, _BRAKE + 1):
         p[i] = min(max(p[i], LEAST_SCALE - 1.0), LARGEST_SCALE - 1.0)
         changed = changed or p[i] != now[i]
         now[i] = p[i]
@@ -88,6 +92,9 @@ def set_scales(car, p):
         return
     friction, cornering = 1.0 + p[_FRICTION], 1.0 + p[_CORNERING]
     spring, damper = 1.0 + p[_SPRING], 1.0 + p[_DAMPER]
+    relaxation = 1.0 + p[_RELAXATION]
+    car.torque_share[0] = car.nominal_torque_share[0] * (1.0 + p[_DRIVE])
+    car.torque_share[1] = car.nominal_torque_share[1] * (1.0 + p[_BRAKE])
     car.drag_area = car.nominal_drag_area * (1.0 + p[_DRAG])
     stiffness, free = pointer(car.jnt_stiffness), pointer(car.qpos_spring)
     damping, bar = pointer(car.dof_damping), pointer(car.tendon_stiffness)
@@ -95,6 +102,8 @@ def set_scales(car, p):
         car.tyres[_LMUX, w] = car.nominal_tyre[0, w] * friction
         car.tyres[_LMUY, w] = car.nominal_tyre[1, w] * friction
         car.tyres[_LKY, w] = car.nominal_tyre[2, w] * cornering
+        car.tyres[_LSGKP, w] = car.nominal_tyre[3, w] * relaxation
+        car.tyres[_LSGAL, w] = car.nominal_tyre[4, w] * relaxation
         stiffness[car.travel_joint[w]] = car.nominal_stiffness[w] * spring
         free[car.travel_qpos[w]] = car.nominal_spring[w] / spring
         damping[car.travel_dof[w]] = car.nominal_damping[w] * damper

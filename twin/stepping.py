@@ -171,7 +171,8 @@ def step_car(car, u, y):
     _air(car)
     road = load(u, 9)
     _axle_forces(car, 0.25 * _total(road))
-    _wheels(car, load(u, 1), load(u, 5), road, _road_normal(car, unpack(road)))
+    drive, brake = load(u, 1) * car.torque_share[0], load(u, 5) * car.torque_share[1]
+    _wheels(car, drive, brake, road, _road_normal(car, unpack(road)))
     mj_step2(car.model, car.data)
     sensordata = pointer(car.sensordata)
     for i in range(len(OUTPUTS)):

@@ -23,7 +23,7 @@ from twin.contact import ROAD
 from twin.errors import TwinError
 from twin.fingerprint import fingerprint
 from twin.four_tyres import table_of
-from twin.scales import bars
+from twin.scales import TORQUES, bars
 from twin.tyre import effective_radius
 from twin.vehicle import SENSORS, Vehicle
 
@@ -39,7 +39,7 @@ class Snapshot(NamedTuple):
 
     state: Array  # MuJoCo's integration state
     tyre_state: Array  # (4, 3)
-    parameters: Array  # (17,)
+    parameters: Array  # (20,)
 
 
 class Twin:
@@ -64,7 +64,8 @@ class Twin:
         self.model = vehicle.compile()
         self.data = mujoco.MjData(self.model)
         self._tyres = vehicle.tyres()
-        self.car = _bind(self.model, self.data, self._tyres)
+        shares = [dict(vehicle.scales).get(name, 1.0) for name in TORQUES]
+        self.car = _bind(self.model, self.data, self._tyres, shares)
         self.dt = self.car.dt
         self.reset()
 
@@ -186,7 +187,7 @@ class Twin:
         kernel.correct(self.car, _vector(dx, len(STATES), "correct"))
 
     def set_parameters(self, p: ArrayLike) -> Array:
-        """Sets the (17,) parameters, see `parameters`; returns what is physically valid."""
+        """Sets the (20,) parameters, see `parameters`; returns what is physically valid."""
         p = _vector(p, len(PARAMETERS), "set_parameters").copy()
         kernel.set_parameters(self.car, p)
         return p
@@ -259,7 +260,9 @@ def _vector(values: ArrayLike, size: int, what: str) -> Array:
     return array
 
 
-def _bind(model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void]) -> Car:
+def _bind(
+    model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void], shares: list[float]
+) -> Car:
     chassis = model.body("chassis").id
     wheels = [model.body(f"wheel_{w}").id for w in WHEELS]
     travels = [model.joint(f"travel_{w}").id for w in WHEELS]
@@ -293,6 +296,8 @@ def _bind(model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void]) -
         steering_ratio=float(model.numeric("steering_ratio").data[0]),
         ackermann=float(model.numeric("ackermann").data[0]),
         drag_area=float(model.numeric("drag_area").data[0]),
+        torque_share=shares,
+        nominal_torque_share=shares,
         lift_area=[float(model.numeric(f"lift_area_{axle}").data[0]) for axle in AXLES],
         axle=[float(hubs[:2, 0].mean()), float(hubs[2:, 0].mean())],
         bar=bars(model),
