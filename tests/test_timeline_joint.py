@@ -11,8 +11,13 @@ from scenarios.timeline_joint import write_joint_timeline
 
 RATE = 1000  # [Hz]
 ESTIMATED = (*twin.LOAD, *twin.SCALES, *FAULTS)
+P = len(ESTIMATED) - len(FAULTS)
 NOMINAL = np.array(
-    [2125.0, -0.1, 0.0, 0.05, 800.0, 3600.0, 3900.0, *(0.0,) * 3, *(1.0,) * 5, 0.0, 0.0]
+    [
+        *(2125.0, -0.1, 0.0, 0.05, 800.0, 3600.0, 3900.0, 0.0, 0.0, 0.0),
+        *(1.0 for _ in twin.SCALES),
+        *(0.0 for _ in twin.FORCES),
+    ]
 )
 DELTA = np.array([200.0, -0.05, 0.01, 0.02, 60.0, 250.0, 300.0, *(5.0,) * 3])
 FOUND_AT = (1.0, 1.5)  # [s]: known, and a change of the load
@@ -38,11 +43,11 @@ def make(seconds):
         truth=truth,
         settings={},
     )
-    prior = np.array([*(PRIOR_SD[x] for x in ESTIMATED[:15]), *FAULT_SD.values()])
+    prior = np.array([*(PRIOR_SD[x] for x in ESTIMATED[:P]), *FAULT_SD.values()])
     sd = prior * np.exp(0.01 * rng.standard_normal((n, prior.size)))
     parameters = np.zeros((n, len(twin.PARAMETERS)))
     parameters[:, :10] = DELTA
-    parameters[:, :15] += 0.1 * prior[:15] * rng.standard_normal((n, 15))
+    parameters[:, :P] += 0.1 * prior[:P] * rng.standard_normal((n, P))
     estimate = JointEstimate(
         time=time,
         states=np.zeros((n, len(twin.STATES))),
@@ -56,7 +61,7 @@ def make(seconds):
         sd=sd,
         valid=np.repeat((time >= FOUND_AT[0])[:, None], prior.size, axis=1),
         changes=(time >= FOUND_AT[1]).astype(np.int64),
-        faults=0.1 * prior[15:] * rng.standard_normal((n, prior.size - 15)),
+        faults=0.1 * prior[P:] * rng.standard_normal((n, prior.size - P)),
         covariance=np.diag(sd[-1] ** 2),
         information=np.diag(sd[-1] ** -2.0),
     )
@@ -105,7 +110,7 @@ def test_estimate_stands_in_a_band_of_two_standard_deviations(rows, run, entity)
     drawn = np.array(rows[f"/{entity}/estimate"]["Scalars:scalars"])
     i = ESTIMATED.index(entity.split("/")[1])
     samples = timeline.thinned(estimate.time, 100.0)
-    values = np.column_stack([estimate.parameters[:, :15], estimate.faults])[samples, i]
+    values = np.column_stack([estimate.parameters[:, :P], estimate.faults])[samples, i]
     np.testing.assert_allclose(drawn[:, 2], values)
     sd = estimate.sd[samples, i]
     np.testing.assert_allclose(drawn[:, :2] - values[:, None], np.outer(sd, (2.0, -2.0)))

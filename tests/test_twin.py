@@ -85,10 +85,10 @@ def test_restore_puts_the_parameters_back():
 def test_replay_is_bit_exact_after_the_parameters_wandered():
     twin = suv(20.0)
     for mass in np.linspace(-399.7, 803.3, 20):
-        twin.set_parameters([mass, *[0.0] * 19])
+        twin.set_parameters([mass, *[0.0] * (len(PARAMETERS) - 1)])
         start = twin.snapshot()
         first = run(twin, manoeuvre(0.02)).states
-        twin.set_parameters([0.3 * mass + 1.0, *[0.0] * 19])
+        twin.set_parameters([0.3 * mass + 1.0, *[0.0] * (len(PARAMETERS) - 1)])
         twin.restore(start)
         np.testing.assert_array_equal(run(twin, manoeuvre(0.02)).states, first)
 
@@ -200,6 +200,6 @@ def run_python(twin):
 
 def test_car_too_heavy_for_its_springs_does_not_settle():
     twin = suv()
-    twin.set_parameters([1e6, *[0.0] * 19])
+    twin.set_parameters([1e6, *[0.0] * (len(PARAMETERS) - 1)])
     with pytest.raises(TwinError, match=r"does not settle on its wheels at 0\.0 m/s"):
         twin.reset()
