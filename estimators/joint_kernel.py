@@ -2,9 +2,11 @@
 
 Beside twin 0 runs one twin per parameter, that parameter a little off. The differences of their
 outputs are the sensitivities H, the differences of their states S: both cost black-box steps only.
-Every block of samples the mean innovation corrects the parameters; and with a step d of the
-parameters each twin's states move by S d, to where they would be had the parameters always been
-these. Without that each step would ring the springs and the sensitivities would lie.
+Every block of samples the mean innovation, relative to where the twins stand, corrects the
+estimates. Once these are far enough from their twins, the twins follow: parameters by a step d and
+states by S d, to where they would be had the parameters always been these. Without that the step
+would ring the springs and the sensitivities would lie. To follow at every block is wrong, too: S
+changes with d, the differences between twins ring, and that counts as information.
 """
 
 import numpy as np
