@@ -1,5 +1,6 @@
 """Progress on standard error, and work spread over processes or a cluster under it."""
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import NoReturn, TypeVar, cast
@@ -12,6 +13,9 @@ Output = TypeVar("Output")
 
 DELAY = 2.0  # [s] before a bar appears
 TIMEOUT = 10.0  # [s] for a cluster to answer
+# After Ctrl-C the process that cleans up behind joblib's workers tells of what it cleans up. It
+# takes its filters from the environment; a user can mend nothing there.
+QUIET = "ignore:resource_tracker:UserWarning"
 
 
 def progress(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:
@@ -34,6 +38,8 @@ def parallel(
     No backend is named: one chosen with `joblib.parallel_config` (Dask, Ray) takes over.
     """
     items = list(items)
+    if QUIET not in os.environ.get("PYTHONWARNINGS", ""):
+        os.environ["PYTHONWARNINGS"] = f"{os.environ.get('PYTHONWARNINGS', '')},{QUIET}".strip(",")
     run = joblib.Parallel(n_jobs=jobs, return_as="generator")
     outputs = cast(Iterator[Output], run(joblib.delayed(function)(item) for item in items))
     return list(progress(outputs, label, len(items)) if label else outputs)
