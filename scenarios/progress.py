@@ -62,12 +62,14 @@ def cluster(address: str | None) -> Iterator[None]:
 
     try:
         from distributed import Client
+        from distributed.comm.addressing import get_address_host_port
     except ImportError:
         raise TwinError(
             "--dask: a cluster needs Dask: pip install 'twin-in-the-loop[dask]'"
         ) from None
     client = None
     try:
+        get_address_host_port(address)  # a client of no address complains when it is collected
         client = Client(address, timeout=TIMEOUT)
         client.wait_for_workers(1, timeout=TIMEOUT)
     except (OSError, ValueError) as error:
