@@ -41,6 +41,7 @@ WORDS = {
     "relaxation": "the relaxation lengths of the tyres",
     "drive_torque": "the share of the drive torque that reaches the wheels",
     "brake_torque": "the share of the brake torque that reaches the wheels",
+    "speed": "the speed",
 }
 # From here on two errors go together so far that neither parameter is told apart from the other
 TOGETHER = 0.95

@@ -30,8 +30,8 @@ from twin import (
 Array = NDArray[np.float64]
 
 # What is estimated of the sensors: biases of the IMU, the delay of all signals, the IMU's position
-# beside where the twin has it. None of them needs a twin.
-FAULTS = (*(f"bias_{name}" for name in OUTPUTS[:6]), "delay", "imu_x", "imu_y", "imu_z")
+# beside where the twin has it; and by how much the twins' speed is off. None of them needs a twin.
+FAULTS = (*(f"bias_{name}" for name in OUTPUTS[:6]), "delay", "imu_x", "imu_y", "imu_z", "speed")
 # Standard deviations before the first sample: a full car more or less, its CM anywhere between the
 # seats, and a model of tyres and springs from a data sheet
 PRIOR_SD = {
@@ -43,10 +43,11 @@ PRIOR_SD = {
     **dict.fromkeys(("drag", "relaxation"), 0.3),
     **dict.fromkeys(("drive_torque", "brake_torque"), 0.03),
 }
-# A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m]
+# A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m, m/s]
 FAULT_SD = dict(
-    zip(FAULTS, (0.1, 0.1, 0.1, 0.005, 0.005, 0.005, 0.01, 0.07, 0.07, 0.07), strict=True)
+    zip(FAULTS, (0.1, 0.1, 0.1, 0.005, 0.005, 0.005, 0.01, 0.07, 0.07, 0.07, 0.1), strict=True)
 )
+SPEED_DRIFT = 0.0003  # of the twins' speed, what no parameter explains [m/s per root of a second]
 # How far each twin is off: as in `estimators.limits`, large beside rounding, small beside curvature
 OFFSETS = {
     "mass": 10.0,
@@ -79,8 +80,15 @@ class JointSettings:
         valid_share: of its prior sd that an estimate's sd has to be below to count as valid.
         drift: share of its prior sd that a parameter may wander over a second.
         step: largest share of its prior sd by which an estimate moves in a block.
-        reach: share of its prior sd that an estimate may be from its twins before they follow.
-        wait: seconds after that in which the twins settle and nothing is corrected.
+        follow_time: by which the twins follow the estimates [s]: slower than the car's own modes.
+        curvature: variance of the error of a sensitivity over its square, once the parameters are
+            uncertain by their prior sd in one of them. Above one, as it lasts for many blocks.
+        speed_curvature: the same of the sensitivity of the speed to a move of the twins.
+        slip_range: share of its speed that a wheel's slip may be uncertain by. Beyond, the noise
+            of its speed grows with the square of that.
+        impact: least jump of the sensitivities from block to block that counts as an impact, in
+            variances of the noise; what is usual of late is none.
+        impact_wait: seconds after one in which nothing is corrected.
         hold_off: seconds before the first correction.
         block: samples per correction.
         speed_gain: draws each twin's speed to the measured wheel speeds [1/s].
@@ -102,8 +110,12 @@ class JointSettings:
     valid_share: float = 0.2
     drift: float = 0.0003
     step: float = 0.1
-    reach: float = 0.1
-    wait: float = 0.3
+    follow_time: float = 0.4
+    curvature: float = 1.5
+    speed_curvature: float = 0.03
+    slip_range: float = 1.6e-4
+    impact: float = 0.3
+    impact_wait: float = 0.2
     hold_off: float = 1.0
     block: int = 10
     speed_gain: float = 0.5
@@ -170,16 +182,23 @@ class JointObserver:
         self._prior = np.array(
             [prior[name] for name in names] + [FAULT_SD[name] for name in settings.faults]
         )
+        drift = settings.drift * self._prior
+        if "speed" in settings.faults:
+            drift[self.estimated.index("speed")] = SPEED_DRIFT
         first = self.fleet.twins[0]
         self.dt = first.dt
         self._setup = Setup(
             parameter=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             offset=np.array([OFFSETS[name] for name in names]),
             fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
-            reach=settings.reach * self._prior[: len(names)],
-            wait=round(settings.wait / (settings.block * self.dt)),
+            follow_time=settings.follow_time,
+            curvature=settings.curvature,
+            speed_curvature=settings.speed_curvature,
+            slip_range=settings.slip_range,
+            impact=settings.impact,
+            impact_wait=settings.impact_wait,
             step_limit=settings.step * self._prior,
-            drift=(settings.drift * self._prior) ** 2,
+            drift=drift**2,
             noise=settings.noise_factor * np.asarray(noise_sd, dtype=np.float64) ** 2,
             nominal=first.car.nominal.copy(),
             block=settings.block,
@@ -205,6 +224,8 @@ class JointObserver:
             theta=np.zeros(p), estimate=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
             present=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
+            rate=np.zeros(len(names)), went=np.zeros(len(names)),
+            usual=np.zeros((ny, len(names))), before=np.zeros((ny, q)),
             excitation=np.zeros((2, 4)),
             information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
             ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),

@@ -3,42 +3,39 @@
 Beside twin 0 runs one twin per parameter, that parameter a little off. The differences of their
 outputs are the sensitivities H, the differences of their states S: both cost black-box steps only.
 Every block of samples the mean innovation, relative to where the twins stand, corrects the
-estimates. Once these are far enough from their twins, the twins follow: parameters by a step d and
-states by S d, to where they would be had the parameters always been these. Without that the step
-would ring the springs and the sensitivities would lie. To follow at every block is wrong, too: S
-changes with d, the differences between twins ring, and that counts as information.
+estimates, as far as the sensitivities can be trusted (`estimators.joint_trust`); the twins follow
+smoothly (`estimators.joint_follow`).
 """
 
 import numpy as np
 from numba import njit
 
 from estimators.joint_doubt import forget_load, keep, load_changed, weigh
+from estimators.joint_follow import follow, follow_speed
 from estimators.joint_memory import (
     ABSENT,
-    ANGLE,
     BLOCKS,
     DELAY,
     DRIVEN,
     EXCITING,
     IMU,
     LEAST_SPIN,
-    NX,
     NY,
-    PITCH,
     POSITION,
     RING,
-    ROLL,
     ROLL_RATE,
     SAMPLES,
-    SPIN,
+    SPEED,
     TOTAL,
     VX,
     WAIT,
     WATCH,
     WHEEL_SPEED,
 )
+from estimators.joint_trust import doubt_linearity, wait_after_impact
 from estimators.rigid_body import project
-from twin.kernel import correct, is_sound, read_states, set_parameters, step
+from estimators.side_by_side import kalman_step
+from twin.kernel import is_sound, read_states, step
 
 
 @njit(cache=True, nogil=True)
@@ -60,7 +57,7 @@ def update(cars, setup, memory, u, y):
     memory.clock[SAMPLES] = 0
     memory.clock[BLOCKS] += 1
     _estimate(cars, setup, memory)
-    _follow_speed(cars, setup, memory)
+    follow_speed(cars, setup, memory)
     memory.total[:] = 0.0
     memory.measured[:] = 0.0
     memory.present[:] = 0.0
@@ -106,6 +103,9 @@ def _sensitivity(setup, memory):
             h[fault, i] = 1.0
         elif fault == DELAY:
             h[:, i] = -change
+        elif fault == SPEED:
+            for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
+                h[j, i] = memory.total[0, j] / setup.block / max(memory.states[0, VX], 1.0)
         else:
             arm = np.zeros(3)
             arm[fault - POSITION] = 1.0
@@ -132,7 +132,7 @@ def _innovation(setup, memory, h):
             variance[j] = setup.noise[j] / memory.present[j]
     for i in range(setup.parameter.size, memory.z.size):
         if setup.fault[i - setup.parameter.size] != DELAY:  # which is in the outputs already
-            for j in range(IMU):
+            for j in range(NY):
                 if variance[j] < ABSENT:
                     r[j] -= h[j, i] * memory.z[i]
     for i in range(setup.parameter.size):
@@ -163,120 +163,60 @@ def _is_excited(setup, memory):
 
 @njit(cache=True, nogil=True)
 def _estimate(cars, setup, memory):
-    """A Kalman step on the parameters, and the twins' states with them."""
+    """A Kalman step on the parameters, and the twins after them."""
+    read_states(cars[0], memory.states[0])
     h = _sensitivity(setup, memory)
     r, variance = _innovation(setup, memory, h)
     weigh(setup, memory, h, r, variance)
-    q, covariance = memory.z.size, memory.covariance
-    seconds = setup.block * setup.dt
+    wait_after_impact(setup, memory, h, variance)
+    doubt_linearity(setup, memory, h, variance)
     excited = _is_excited(setup, memory)
     if memory.blocks[WAIT] > 0:
         memory.blocks[WAIT] -= 1
         excited = False
-    if excited and memory.clock[BLOCKS] > setup.hold_off:
-        memory.blocks[DRIVEN] += 1
-        if memory.blocks[WATCH] > 0:
-            memory.blocks[WATCH] -= 1
-            if load_changed(setup, memory, h, r):
-                forget_load(setup, memory)
-                for i in range(setup.parameter.size):
-                    memory.estimate[setup.parameter[i]] = memory.z[i]
-                _move(cars, setup, memory)
-                return
-        hp = h @ covariance
-        s = hp @ h.T
-        for j in range(NY):
-            s[j, j] += variance[j]
-        gain = np.ascontiguousarray(np.linalg.solve(s, hp).T)
-        move = gain @ r
-        share = 1.0
-        for i in range(q):
-            if share * abs(move[i]) > setup.step_limit[i]:
-                share = setup.step_limit[i] / abs(move[i])
-        gain *= share
-        rest = np.eye(q) - gain @ h
-        scaled = np.empty_like(gain)
+    if not excited or memory.clock[BLOCKS] <= setup.hold_off:
+        keep(setup, memory)
+    elif _changed(setup, memory, h, r):
+        forget_load(setup, memory)
+        for i in range(setup.parameter.size):
+            memory.estimate[setup.parameter[i]] = memory.z[i]
+        follow(cars, setup, memory)
+    else:
+        kalman_step(memory.z, memory.covariance, h, r, variance, setup.step_limit)
         informed = np.empty_like(h)
         for j in range(NY):
-            scaled[:, j] = gain[:, j] * variance[j]
             informed[j] = h[j] / variance[j]
-        covariance[:] = rest @ covariance @ rest.T + scaled @ gain.T
         memory.information[:] += h.T @ informed
-        memory.z[:] += share * move
-        for i in range(setup.parameter.size, q):
+        for i in range(setup.parameter.size, memory.z.size):
             if setup.fault[i - setup.parameter.size] == DELAY:
                 memory.z[i] = min(max(memory.z[i], -setup.dt), (RING - 2) * setup.dt)
-        project(memory.z, covariance, setup.parameter, setup.nominal, memory.estimate)
-        _move_if_far(cars, setup, memory)
-    else:
-        keep(setup, memory)
-    for i in range(q):
+        project(memory.z, memory.covariance, setup.parameter, setup.nominal, memory.estimate)
+        follow(cars, setup, memory)
+    _drift(setup, memory)
+
+
+@njit(cache=True, nogil=True)
+def _changed(setup, memory, h, r):
+    """Whether the load is another since the last standstill; looked for a while after it."""
+    memory.blocks[DRIVEN] += 1
+    if memory.blocks[WATCH] == 0:
+        return False
+    memory.blocks[WATCH] -= 1
+    return load_changed(setup, memory, h, r)
+
+
+@njit(cache=True, nogil=True)
+def _drift(setup, memory):
+    """What a block's time adds to the variances; the twins' speeds are held, and forget."""
+    seconds, covariance = setup.block * setup.dt, memory.covariance
+    for i in range(memory.z.size):
+        fault = i - setup.parameter.size
+        if fault >= 0 and setup.fault[fault] == SPEED:
+            left = 1.0 - setup.speed_gain * seconds
+            memory.z[i] *= left
+            covariance[i] *= left
+            covariance[:, i] *= left
         covariance[i, i] += setup.drift[i] * seconds
-
-
-@njit(cache=True, nogil=True)
-def _move_if_far(cars, setup, memory):
-    """Lets the twins follow once an estimate has left the range in which they tell H."""
-    for i in range(setup.parameter.size):
-        ahead = memory.z[i] - memory.theta[setup.parameter[i]]
-        if abs(ahead) > setup.reach[i]:
-            _move(cars, setup, memory)
-            memory.blocks[WAIT] = setup.wait
-            return
-
-
-@njit(cache=True, nogil=True)
-def _move(cars, setup, memory):
-    """Steps the twins' parameters to the estimates and every twin's states by S d."""
-    n, p = cars.size, setup.parameter.size
-    d = np.zeros(p)
-    for i in range(p):
-        d[i] = memory.z[i] - memory.theta[setup.parameter[i]]
-    states, dx, theta = memory.states, memory.dx, memory.theta
-    for i in range(n):
-        read_states(cars[i], states[i])
-    dx[:] = 0.0
-    for i in range(p):
-        for k in range(2, NX):
-            dx[k] += (states[i + 1, k] - states[0, k]) * d[i] / setup.offset[i]
-    # heading and wheel angles have no influence; a small turn about the body's axes in place of
-    # the change of roll and pitch angles
-    roll, pitch, angle = dx[ROLL], dx[PITCH], states[0, ROLL]
-    dx[PITCH], dx[PITCH + 1] = np.cos(angle) * pitch, -np.sin(angle) * pitch
-    dx[ROLL] = roll
-    dx[ANGLE : ANGLE + 4] = 0.0
-    for i in range(p):
-        theta[setup.parameter[i]] = memory.z[i]
-    for i in range(n):
-        correct(cars[i], dx)
-        memory.p[:] = theta
-        if i > 0:
-            memory.p[setup.parameter[i - 1]] += setup.offset[i - 1]
-        set_parameters(cars[i], memory.p)
-
-
-@njit(cache=True, nogil=True)
-def _follow_speed(cars, setup, memory):
-    """Draws each twin's speed weakly to its own innovation of the wheel speeds."""
-    share = setup.speed_gain * setup.block * setup.dt
-    if share == 0.0:
-        return
-    for i in range(cars.size):
-        late, spin, n = 0.0, 0.0, 0
-        for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
-            if memory.present[j] > 0.0:
-                mean = memory.total[i, j] / setup.block
-                late += memory.measured[j] / memory.present[j] - mean
-                spin += mean
-                n += 1
-        if n == 0 or spin < n * LEAST_SPIN:
-            continue
-        read_states(cars[i], memory.states[i])
-        memory.dx[:] = 0.0
-        memory.dx[VX] = share * late / spin * memory.states[i, VX]
-        for k in range(SPIN, SPIN + 4):
-            memory.dx[k] = share * late / spin * memory.states[i, k]
-        correct(cars[i], memory.dx)
 
 
 @njit(cache=True, nogil=True)

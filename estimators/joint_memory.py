@@ -23,8 +23,9 @@ STANDING = 0.5  # and slower than this the car stands; chosen
 # Blocks: left to look for a change of the load; of exciting driving so far; left to wait
 WATCH, DRIVEN, WAIT = 0, 1, 2
 SAMPLES, BLOCKS, TOTAL = 0, 1, 2  # what the clock counts: of the block, blocks, of all
-# What is estimated of the sensors besides parameters: biases, delay, and the place of the IMU
-DELAY, POSITION = IMU, IMU + 1
+# What is estimated of the sensors besides parameters: biases, delay, the place of the IMU; and of
+# the twins by how much their common speed is off
+DELAY, POSITION, SPEED = IMU, IMU + 1, IMU + 4
 RING = 64  # samples: the longest delay
 LARGEST_DOUBT = 1e3  # of one window
 WINDOW = 16  # blocks over which innovations are summed to see whether they are white
@@ -36,8 +37,12 @@ class Setup(NamedTuple):
     parameter: Indices  # (p,) of each among the twin's
     offset: Array  # (p,) of its twin
     fault: Indices  # (q - p,) of the sensors: channel of a bias, DELAY, POSITION + axis
-    reach: Array  # (p,) from their twins that estimates may be before these follow
-    wait: int  # blocks after that
+    follow_time: float  # of the twins behind the estimates [s]
+    curvature: float  # of the sensitivities, per prior variance
+    speed_curvature: float  # the same of the speed's
+    slip_range: float  # share of a wheel's speed
+    impact: float  # least jump of sensitivities that is one, of the noise's variance
+    impact_wait: float  # after one [s]
     step_limit: Array  # (q,) the most an estimate may move in a block
     drift: Array  # (q,) variance per second
     noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
@@ -76,6 +81,10 @@ class Memory(NamedTuple):
     states: Array  # (n, nx)
     dx: Array  # (nx,)
     p: Array  # (np,) what is set
+    rate: Array  # (p,) at which the twins follow, times the time in which they do
+    went: Array  # (p,) what they moved lately
+    usual: Array  # (ny, p) mean squares of the sensitivities
+    before: Array  # (ny, q) sensitivities of the block before
     excitation: Array  # (2, 4) means and squares of what excites
     information: Array  # (q, q) of what was used
     ring: Array  # (RING, n, ny) the twins' last outputs

@@ -111,7 +111,8 @@ def truth(drive: Drive) -> Array:
 def faults(sensors: Sensors) -> dict[str, float]:
     """What the observer should find of the sensors, by name of `estimators.joint.FAULTS`."""
     biases = (*sensors.acceleration_bias, *sensors.rate_bias)
-    return dict(zip(FAULTS, (*biases, sensors.delay, *sensors.position), strict=True))
+    found = (*biases, sensors.delay, *sensors.position, 0.0)
+    return dict(zip(FAULTS, found, strict=True))
 
 
 def observe(

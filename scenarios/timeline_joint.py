@@ -156,7 +156,7 @@ def _unit(name: str) -> str:
     if name in twin.PARAMETERS:
         return tl.unit_of(name)
     kind, _, biased = name.partition("_")
-    return {"delay": "s", "imu": "m"}.get(kind) or _FAULT_UNITS[biased[0]]
+    return {"delay": "s", "imu": "m", "speed": "m/s"}.get(kind) or _FAULT_UNITS[biased[0]]
 
 
 def _lanes(estimate: JointEstimate) -> dict[str, Lane]:
