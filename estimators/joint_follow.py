@@ -11,17 +11,8 @@ the twins stand.
 import numpy as np
 from numba import njit
 
-from estimators.joint_memory import (
-    ANGLE,
-    LEAST_SPIN,
-    NX,
-    PITCH,
-    ROLL,
-    SPEED,
-    SPIN,
-    VX,
-    WHEEL_SPEED,
-)
+from estimators.joint_memory import LEAST_SPIN, NX, ROLL, SPEED, SPIN, VX, WHEEL_SPEED
+from estimators.side_by_side import move_states
 from twin.kernel import correct, read_states, set_parameters
 
 
@@ -43,18 +34,12 @@ def follow(cars, setup, memory):
     _doubt_speed(setup, memory)
     dx[:] = 0.0
     for i in range(p):
-        for k in range(2, NX):
+        for k in range(NX):
             dx[k] += (states[i + 1, k] - states[0, k]) * d[i] / setup.offset[i]
-    # heading and wheel angles have no influence; a small turn about the body's axes in place of
-    # the change of roll and pitch angles
-    roll, pitch, angle = dx[ROLL], dx[PITCH], states[0, ROLL]
-    dx[PITCH], dx[PITCH + 1] = np.cos(angle) * pitch, -np.sin(angle) * pitch
-    dx[ROLL] = roll
-    dx[ANGLE : ANGLE + 4] = 0.0
     for i in range(p):
         theta[setup.parameter[i]] += d[i]
     for i in range(n):
-        correct(cars[i], dx)
+        move_states(cars[i], dx.copy(), states[0, ROLL])
         memory.p[:] = theta
         if i > 0:
             memory.p[setup.parameter[i - 1]] += setup.offset[i - 1]

@@ -12,8 +12,7 @@ Indices = NDArray[np.int64]
 
 IMU, NY, NX = 6, len(OUTPUTS), len(STATES)
 WHEEL_SPEED = OUTPUTS.index("wheel_speed_fl")
-ROLL, PITCH, VX, SPIN = (STATES.index(n) for n in ("roll", "pitch", "vx", "wheel_speed_fl"))
-ANGLE = STATES.index("wheel_angle_fl")
+ROLL, VX, SPIN = (STATES.index(n) for n in ("roll", "vx", "wheel_speed_fl"))
 AX, AY, ROLL_RATE, PITCH_RATE = (OUTPUTS.index(n) for n in ("ax", "ay", "roll_rate", "pitch_rate"))
 EXCITING = np.array([AX, AY, ROLL_RATE, PITCH_RATE])
 ABSENT = 1e12  # variance of a channel that has no measurement
