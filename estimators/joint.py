@@ -67,9 +67,7 @@ class JointSettings:
         parameters: of `twin.PARAMETERS`, one twin for each.
         faults: of `FAULTS`, what is estimated of the sensors along.
         prior_sd: by parameter, instead of `PRIOR_SD`.
-        noise_factor: by which the noise's variance is taken larger than it is, for what the
-            linearisation leaves out.
-        doubt: by which it is first taken larger besides, until innovations prove to be white.
+        doubt: by which the noise's variance is first taken larger, until innovations prove white.
         doubt_memory: how fast that is seen [s].
         watch: seconds of driving after a standstill in which a change of the load is looked for.
         settle: seconds of driving before the first standstill at which the load can change.
@@ -99,7 +97,6 @@ class JointSettings:
     parameters: tuple[str, ...] = (*LOAD, *SCALES)
     faults: tuple[str, ...] = FAULTS
     prior_sd: Mapping[str, float] = field(default_factory=dict)
-    noise_factor: float = 1.0
     doubt: float = 3.0
     doubt_memory: float = 10.0
     watch: float = 20.0
@@ -199,7 +196,7 @@ class JointObserver:
             impact_wait=settings.impact_wait,
             step_limit=settings.step * self._prior,
             drift=drift**2,
-            noise=settings.noise_factor * np.asarray(noise_sd, dtype=np.float64) ** 2,
+            noise=np.asarray(noise_sd, dtype=np.float64) ** 2,
             nominal=first.car.nominal.copy(),
             block=settings.block,
             hold_off=round(settings.hold_off / (settings.block * self.dt)),
@@ -361,6 +358,9 @@ class JointObserver:
 
 
 def _check(settings: JointSettings, noise_sd: Array) -> None:
+    for name in ("follow_time", "slip_range", "doubt_memory", "change_memory"):
+        if not 0.0 < (value := getattr(settings, name)) < np.inf:
+            raise TwinError(f"joint: {name} is {value}; allowed: a finite number above zero")
     unknown = [name for name in settings.parameters if name not in PRIOR_SD]
     if unknown or len(set(settings.parameters)) < len(settings.parameters):
         raise TwinError(

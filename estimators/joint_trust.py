@@ -2,7 +2,7 @@
 
 A sensitivity changes with the parameters by about its own size over a prior's standard deviation.
 As long as the estimates are uncertain, or far from the twins, that error is proportional to the
-sensitivities, lasts longer than a block, and would count as information a thousand times over; in
+sensitivities, lasts longer than a block, and would count as information in each of them; in
 the direction in which all masses, stiffnesses and torques grow together, and the motion hardly
 changes, it would be all the information there is. Its variance, of second order, adds to the noise
 and vanishes as the estimates become certain and the twins catch up.
@@ -51,7 +51,7 @@ def _slip_doubt(setup, memory, h, j):
     """Variance of what a wheel's speed is beside its sensitivity: it may lock, or not.
 
     What the wheels have in common is the car's speed; the rest is slip. Near the peak of its tyre's
-    force a wheel's slip depends on everything, a hundred times more than usual, and not linearly.
+    force a wheel's slip depends on everything, ten times more than usual, and not linearly.
     """
     own = _own(h, j)
     ahead = 0.0

@@ -145,9 +145,11 @@ def test_delay_and_bias_of_the_sensors_are_found(drive):
     [
         ({"parameters": ("mass", "colour")}, "parameters are mass, colour; allowed: each at most"),
         ({"faults": ("delay", "delay")}, "faults are delay, delay; allowed: each at most once"),
+        ({"follow_time": 0.0}, "follow_time is 0.0; allowed: a finite number above zero"),
+        ({"slip_range": np.nan}, "slip_range is nan; allowed: a finite number above zero"),
     ],
 )
-def test_unknown_or_repeated_names_are_refused(settings, message):
+def test_settings_that_cannot_be_are_refused(settings, message):
     with pytest.raises(TwinError, match=message):
         JointObserver(Vehicle.load("suv"), SD, JointSettings(**settings))
 
