@@ -41,6 +41,6 @@ clean:  ## removes results and caches, not the virtual environment
 	touch $@
 
 # numba compares a cached function with its own file only, not with those of what it calls.
-.venv/numba.stamp: $(wildcard twin/*.py estimators/*.py scenarios/*.py) | .venv/pyvenv.cfg
-	rm -f */__pycache__/*.nb[ic]
+.venv/numba.stamp: $(shell find twin estimators scenarios -name '*.py') | .venv/pyvenv.cfg
+	find twin estimators scenarios -name '*.nb[ic]' -delete
 	touch $@

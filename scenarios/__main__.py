@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
-from scenarios import log_commands, study_commands
-from scenarios.options import Mistake
+from scenarios.cli import log_commands, study_commands
+from scenarios.cli.options import Mistake
 
 
 def main(args: Sequence[str] | None = None) -> int:

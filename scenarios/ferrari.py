@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import models
-from estimators import single_track, static_map
+from estimators.benchmarks import single_track, static_map
 from estimators.speed_follower import SpeedFollower
-from scenarios import calibrate
-from scenarios.calibrate import cut
-from scenarios.candidate import Candidate
-from scenarios.catalogue import Scenario, Settings, Tuning
-from scenarios.ferrari_log import PARTS, data_file, load, part
-from scenarios.pictures import figure
-from scenarios.result import Result, Row
+from scenarios.calibration import calibrate
+from scenarios.calibration.calibrate import cut
+from scenarios.calibration.candidate import Candidate
+from scenarios.calibration.ferrari_log import PARTS, data_file, load, part
+from scenarios.cli.catalogue import Scenario, Settings, Tuning
+from scenarios.experiment.result import Result, Row
+from scenarios.report.pictures import figure
 from twin import Drive, TwinError, Vehicle
 
 Array = NDArray[np.float64]
@@ -196,7 +196,7 @@ def _track(drive: Drive, samples: slice) -> tuple[Array, Array]:
 
 def timeline(settings: Settings, path: Path) -> None:
     """The calibrated twin over the log as a Rerun recording."""
-    from scenarios.timeline import write_timeline
+    from scenarios.timeline.timeline import write_timeline
 
     drive, candidate = _drive(settings), calibrated()
     estimate = candidate.run(drive)

@@ -1,6 +1,6 @@
 """Laps of a circuit, and lane changes: a sports car at its limits, its twin off by 350 kg.
 
-TiL Section 5, sideslip and mass together; see `scenarios.state_study`.
+TiL Section 5, sideslip and mass together; see `scenarios.experiment.state_study`.
 """
 
 import sys
@@ -10,11 +10,11 @@ from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
-from scenarios import state_study
-from scenarios.catalogue import Scenario, Settings, Tuning
-from scenarios.progress import parallel
-from scenarios.result import Result, Row
-from scenarios.state_study import ESTIMATORS, TWIN, Run, Score, score
+from scenarios.cli.catalogue import Scenario, Settings, Tuning
+from scenarios.experiment import state_study
+from scenarios.experiment.progress import parallel
+from scenarios.experiment.result import Result, Row
+from scenarios.experiment.state_study import ESTIMATORS, TWIN, Run, Score, score
 
 CASE = "mismatched"
 
@@ -68,12 +68,12 @@ def _scenario(drive: str) -> Scenario:
         )
 
     def tune(tuning: Tuning) -> Result:
-        from scenarios import tune_states  # not at the top: a run needs none of it
+        from scenarios.tuning import states as tune_states
 
         return tune_states.run(CASE, tuning)
 
     def timeline(settings: Settings, path: Path) -> None:
-        from scenarios import timeline_laps  # not at the top: it imports Rerun
+        from scenarios.timeline import laps as timeline_laps
 
         timeline_laps.write(path, _runs(drive, settings), title=drive)
 

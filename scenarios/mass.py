@@ -5,9 +5,9 @@ TiL Section 4.2, Table 4.
 
 import sys
 
-from estimators.law import ParameterLaw
-from scenarios.manoeuvres import urban
-from scenarios.study import INFINITE, MASS, Case, Study, scenario
+from estimators.til.law import ParameterLaw
+from scenarios.driving.manoeuvres import urban
+from scenarios.experiment.study import INFINITE, MASS, Case, Study, scenario
 
 STUDY = Study(
     target="scenarios.mass:STUDY",

@@ -2,9 +2,9 @@
 
 import sys
 
-from estimators.law import ParameterLaw
-from scenarios.manoeuvres import random_road
-from scenarios.study import CM, INFINITE, MASS, Case, Study, scenario
+from estimators.til.law import ParameterLaw
+from scenarios.driving.manoeuvres import random_road
+from scenarios.experiment.study import CM, INFINITE, MASS, Case, Study, scenario
 
 
 def _paper(jyy: float) -> tuple[tuple[str, float], ...]:

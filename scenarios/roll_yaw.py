@@ -2,9 +2,9 @@
 
 import sys
 
-from estimators.law import ParameterLaw
-from scenarios.manoeuvres import swept_steer
-from scenarios.study import CM, INFINITE, Case, Study, scenario
+from estimators.til.law import ParameterLaw
+from scenarios.driving.manoeuvres import swept_steer
+from scenarios.experiment.study import CM, INFINITE, Case, Study, scenario
 
 WRONG_MASS = CM
 WRONG_MASS_AND_CM = ()

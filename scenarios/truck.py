@@ -10,11 +10,11 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from scenarios.catalogue import Scenario, Settings
-from scenarios.result import Result
-from scenarios.truck_drive import FULL_DURATION, NOISE, TruckCase, make_drive
-from scenarios.truck_estimators import ESTIMATORS, some
-from scenarios.truck_score import run_cases
+from scenarios.cli.catalogue import Scenario, Settings
+from scenarios.experiment.result import Result
+from scenarios.papers.truck_drive import FULL_DURATION, NOISE, TruckCase, make_drive
+from scenarios.papers.truck_estimators import ESTIMATORS, some
+from scenarios.papers.truck_score import run_cases
 from twin import TwinError
 
 ESTIMATED = ("kalman-bucy", "kalman-bucy-matched", "kalman-bucy-literal", "til")
@@ -45,7 +45,7 @@ def run(settings: Settings) -> Result:
 
 def timeline(settings: Settings, path: Path) -> None:
     """The first seed's drive under the smaller noise as a Rerun recording."""
-    from scenarios.timeline_truck import write_truck_timeline
+    from scenarios.timeline.truck import write_truck_timeline
 
     case = cases(settings)[0]
     drive = make_drive(case, settings.seeds[0])

@@ -7,9 +7,9 @@ import numpy as np
 from numba import njit
 
 import models
-from estimators.observer import Observer
-from scenarios.joint_drives import mixed
-from scenarios.record import record
+from estimators.til.observer import Observer
+from scenarios.driving.joint_drives import mixed
+from scenarios.driving.record import record
 from twin import INPUTS, TYRE_OUTPUTS, WHEELS, Twin, Vehicle, noise_sd, with_noise
 from twin.kernel import read_states, step
 

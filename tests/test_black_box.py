@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from estimators.black_box import BlackBox
-from estimators.law import ParameterLaw
-from estimators.observer import Observer
+from estimators.til.law import ParameterLaw
+from estimators.til.observer import Observer
 from scenarios import mass
-from scenarios.manoeuvres import urban
-from scenarios.record import record
+from scenarios.driving.manoeuvres import urban
+from scenarios.driving.record import record
 from twin import Drive, TruckTwin, Twin, TwinError, Vehicle
 
 LAW = ParameterLaw(parameter="mass", signal="ax", scale=10.0, prior_sd=10.0, noise_density=1e-3)

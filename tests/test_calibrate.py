@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from estimators.speed_follower import TORQUES
-from scenarios import calibrate
 from scenarios.__main__ import main
-from scenarios.calibrate import Task, residuals
-from scenarios.candidate import Candidate
-from scenarios.manoeuvres import swept_steer
-from scenarios.record import record
+from scenarios.calibration import calibrate
+from scenarios.calibration.calibrate import Task, residuals
+from scenarios.calibration.candidate import Candidate
+from scenarios.driving.manoeuvres import swept_steer
+from scenarios.driving.record import record
 from twin import OUTPUTS, TwinError, Vehicle
 
 FACTORS = {"front_cornering_stiffness": 0.85, "rear_cornering_stiffness": 1.2}

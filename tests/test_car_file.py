@@ -6,9 +6,9 @@ from cars import inputs, run, times
 
 import models
 from twin import Twin, TwinError, Vehicle
-from twin.car_fields import SECTIONS
-from twin.car_file import template, write_template
-from twin.tyre import magic_formula, relaxation_lengths, slip_stiffnesses
+from twin.car.fields import SECTIONS
+from twin.car.toml_car import template, write_template
+from twin.tyre.magic_formula import magic_formula, relaxation_lengths, slip_stiffnesses
 
 FIELDS = [(section, field) for section in SECTIONS for field in section.fields]
 NUMBERS = [(s, f) for s, f in FIELDS if not isinstance(f.default, str)]

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from scenarios.circuit import LENGTH, circuit, pieces
-from scenarios.path import Piece, end_of, follow_on, path_of
+from scenarios.driving.circuit import LENGTH, circuit, pieces
+from scenarios.driving.path import Piece, end_of, follow_on, path_of
 
 
 def test_circuit_closes_in_place_and_heading():

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from scenarios import __main__ as cli
-from scenarios import catalogue
-from scenarios.catalogue import REPRODUCTIONS, SCENARIOS, Entry, Scenario
-from scenarios.result import Result, Row
+from scenarios.cli import catalogue
+from scenarios.cli.catalogue import REPRODUCTIONS, SCENARIOS, Entry, Scenario
+from scenarios.experiment.result import Result, Row
 from twin import TwinError
 
 ROOT = Path(__file__).parents[1]
@@ -148,7 +148,9 @@ def test_rrd_file_holds_the_timeline_of_the_first_seed(til, tmp_path):
 @pytest.mark.parametrize("options", [(), ("--rrd", "fake.rrd")])
 def test_view_opens_the_timeline(til, monkeypatch, options):
     seen = []
-    monkeypatch.setattr("scenarios.timeline.view", lambda path: seen.append(path.read_text()))
+    monkeypatch.setattr(
+        "scenarios.timeline.timeline.view", lambda path: seen.append(path.read_text())
+    )
     assert til("run", "fake", "--view", *options)[0] == 0
     assert seen == ["timeline of seed 0"]
 
@@ -258,7 +260,7 @@ def test_list_imports_neither_mujoco_nor_numba_nor_numpy():
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     modules = set(run.stdout.split())
-    assert "scenarios.catalogue" in modules
+    assert "scenarios.cli.catalogue" in modules
     assert modules & {"mujoco", "numba", "numpy", "joblib", "rerun"} == set()
 
 
@@ -273,9 +275,10 @@ def test_module_runs_as_the_program_does():
 def test_ctrl_c_ends_parallel_work_with_one_line(tmp_path):
     code = f"""
 import sys, time
-from scenarios import __main__ as cli, catalogue
-from scenarios.catalogue import Scenario
-from scenarios.progress import parallel
+from scenarios import __main__ as cli
+from scenarios.cli import catalogue
+from scenarios.cli.catalogue import Scenario
+from scenarios.experiment.progress import parallel
 
 def sleep(i):
     open({str(tmp_path)!r} + f"/{{i}}", "w").close()

@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimators.law import ParameterLaw
-from estimators.observer import Observer
-from scenarios.commonroad import COMMONROAD_LIMITS, DT, LANE_CHANGE_LATERAL, record
-from scenarios.drivers import DRIVERS, LIMITS
-from scenarios.manoeuvres import lane_changes, laps
+from estimators.til.law import ParameterLaw
+from estimators.til.observer import Observer
+from scenarios.driving.drivers import DRIVERS, LIMITS
+from scenarios.driving.manoeuvres import lane_changes, laps
+from scenarios.plants.commonroad import COMMONROAD_LIMITS, DT, LANE_CHANGE_LATERAL, record
 from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, TYRE_OUTPUTS, WHEELS, Twin, TwinError, Vehicle
-from twin.commonroad_model import GRAVITY, bmw_320i
+from twin.commonroad.model import GRAVITY, bmw_320i
 
 CAR = bmw_320i()
 COURSE = lane_changes(limits=COMMONROAD_LIMITS, lateral=LANE_CHANGE_LATERAL, duration=30.0)

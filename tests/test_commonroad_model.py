@@ -9,8 +9,8 @@ from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
 from twin import TYRE_OUTPUTS
-from twin.commonroad_axes import COMMONROAD_STATES, measurements, move, our_states, suspensions
-from twin.commonroad_model import (
+from twin.commonroad.axes import COMMONROAD_STATES, measurements, move, our_states, suspensions
+from twin.commonroad.model import (
     FRONT,
     GRAVITY,
     REAR,
@@ -22,7 +22,7 @@ from twin.commonroad_model import (
     is_sound,
     rolling,
 )
-from twin.commonroad_tyres import tyre_outputs
+from twin.commonroad.tyres import tyre_outputs
 
 CAR = bmw_320i()
 THEIRS = parameters_vehicle2()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from estimators.black_box import BlackBox
-from estimators.law import ParameterLaw
-from estimators.observer import Observer
+from estimators.til.law import ParameterLaw
+from estimators.til.observer import Observer
 from twin import INPUTS, OUTPUTS, CommonRoadTwin, Drive, TwinError
-from twin.commonroad_twin import COMMONROAD_PARAMETERS, COMMONROAD_STATES
+from twin.commonroad.twin import COMMONROAD_PARAMETERS, COMMONROAD_STATES
 
 LOAD = 200.0  # [kg]
 
@@ -158,4 +158,4 @@ def test_a_missing_package_is_one_clear_error(monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "vehiclemodels", None)
     with pytest.raises(TwinError, match=r"pip install 'twin-in-the-loop\[commonroad\]'"):
-        from twin.commonroad_model import bmw_320i  # noqa: F401
+        from twin.commonroad.model import bmw_320i  # noqa: F401

@@ -3,12 +3,12 @@ import math
 import numpy as np
 import pytest
 
-from estimators import double_track
-from estimators.double_track import Gains, MagicFormula, _axle, friction, slips
-from scenarios import double_track_fit
-from scenarios.drivers import DRIVERS
-from scenarios.manoeuvres import Manoeuvre
-from scenarios.record import record
+from estimators.benchmarks import double_track
+from estimators.benchmarks.double_track import Gains, MagicFormula, _axle, friction, slips
+from scenarios.driving.drivers import DRIVERS
+from scenarios.driving.manoeuvres import Manoeuvre
+from scenarios.driving.record import record
+from scenarios.tuning import double_track_fit
 from twin import OUTPUTS, TwinError, Vehicle
 
 NONE = Gains(0.0, 0.0, 0.0, 0.0)

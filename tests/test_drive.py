@@ -6,8 +6,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from twin.drive import Drive
 from twin.errors import TwinError
+from twin.logs.drive import Drive
 
 
 def make_drive(samples=50, **changes):

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from scenarios.driver import drive_along, new_memory
-from scenarios.drivers import DRIVERS, LIMITS
-from scenarios.lane_change import lanes, length, stretch
-from scenarios.manoeuvres import lane_changes, laps
-from scenarios.record import record
+from scenarios.driving.double_lane_change import lanes, length, stretch
+from scenarios.driving.driver import drive_along, new_memory
+from scenarios.driving.drivers import DRIVERS, LIMITS
+from scenarios.driving.manoeuvres import lane_changes, laps
+from scenarios.driving.record import record
 from twin import INPUTS, STATES, Twin, Vehicle
 
 G = 9.81

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from twin import elementary
-from twin.lanes import load, unpack
+from twin.compiled import elementary
+from twin.compiled.simd import load, unpack
 
 RNG = np.random.default_rng(1)
 ANGLES = np.concatenate([RNG.uniform(-40.0, 40.0, 2000), RNG.uniform(-1e-3, 1e-3, 500), [0.0]])

@@ -10,14 +10,14 @@ import pytest
 
 from estimators.speed_follower import TORQUES
 from scenarios import __main__ as cli
-from scenarios import estimate_stream
-from scenarios.estimate import Task, observe
-from scenarios.log_pieces import measured, prepared
-from scenarios.manoeuvres import urban
-from scenarios.record import record
+from scenarios.driving.manoeuvres import urban
+from scenarios.driving.record import record
+from scenarios.logs import stream as estimate_stream
+from scenarios.logs.estimate import Task, observe
+from scenarios.logs.pieces import measured, prepared
 from twin import OUTPUTS, TwinError, Vehicle, with_noise
-from twin.log_map import LogMap
-from twin.units import GRAVITY
+from twin.logs.map import LogMap
+from twin.logs.units import GRAVITY
 
 ROOT = Path(__file__).parents[1]
 DEG, RADIUS = np.pi / 180.0, 0.36

@@ -4,12 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenarios import ferrari, ferrari_log
+from scenarios import ferrari
 from scenarios.__main__ import main
-from scenarios.catalogue import Settings
-from scenarios.free_parameters import FREE
-from scenarios.manoeuvres import swept_steer
-from scenarios.record import record
+from scenarios.calibration import ferrari_log
+from scenarios.calibration.free_parameters import FREE
+from scenarios.cli.catalogue import Settings
+from scenarios.driving.manoeuvres import swept_steer
+from scenarios.driving.record import record
 from twin import Twin, TwinError, Vehicle
 
 SETTINGS = Settings(snr=float("nan"), seeds=(0,), jobs=1, duration=None)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimators.fit import fit
+from estimators.least_squares import fit
 from twin import TwinError
 
 T = np.arange(2000) * 0.05

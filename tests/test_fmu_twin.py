@@ -11,8 +11,8 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 
 from estimators.black_box import BlackBox
-from estimators.law import ParameterLaw
-from estimators.observer import Observer
+from estimators.til.law import ParameterLaw
+from estimators.til.observer import Observer
 from twin import Drive, FmuNames, FmuTwin, TwinError
 
 LAW = ParameterLaw(parameter="mass", signal="ax", scale=10.0, prior_sd=10.0, noise_density=1e-3)

@@ -1,9 +1,10 @@
 import pytest
 
-from scenarios import gains, state_study
 from scenarios.__main__ import main
-from scenarios.state_study import BOUNDS
-from scenarios.tune import Tuned
+from scenarios.experiment import state_study
+from scenarios.experiment.state_study import BOUNDS
+from scenarios.tuning import gains
+from scenarios.tuning.tune import Tuned
 from twin import TwinError
 
 TUNED = Tuned(

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from estimators.guard import FREEZE, new_watch
-from estimators.guard import guard as watch_sample
+from estimators.til.measurement_validation import FREEZE, new_watch
+from estimators.til.measurement_validation import guard as watch_sample
 from twin import OUTPUTS
 
 DT = 1e-3

@@ -36,11 +36,11 @@ from cars import (
 )
 
 import models
-from scenarios.manoeuvres import Manoeuvre
-from scenarios.record import record
+from scenarios.driving.manoeuvres import Manoeuvre
+from scenarios.driving.record import record
 from twin import STATES, TYRE_OUTPUTS, WHEELS, Twin, Vehicle
-from twin.tir import read_tyre
-from twin.tyre import effective_radius
+from twin.tyre.magic_formula import effective_radius
+from twin.tyre.tir import read_tyre
 
 TYRE = read_tyre(models.path("tyres/suv.tir"))
 

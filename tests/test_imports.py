@@ -64,10 +64,10 @@ def test_room_imports_only_what_lies_to_its_left(room):
         ("estimators", "import mujoco", "mujoco"),
         ("estimators", "from mujoco import MjData", "mujoco.MjData"),
         ("estimators", "import twin", "twin"),
-        ("estimators", "import twin.vehicle as v", "twin.vehicle"),
+        ("estimators", "import twin.car.vehicle as v", "twin.car.vehicle"),
         ("estimators", "from twin import kernel", "twin.kernel"),
         ("estimators", "from twin import *", "twin.*"),
-        ("estimators", "from twin.vehicle import Vehicle", "twin.vehicle.Vehicle"),
+        ("estimators", "from twin.car.vehicle import Vehicle", "twin.car.vehicle.Vehicle"),
         ("estimators", "from twin.kernel import tyre_forces", "twin.kernel.tyre_forces"),
         ("estimators", "from scenarios import lap", "scenarios.lap"),
     ],
@@ -83,7 +83,7 @@ def test_forbidden_import_is_found(package, line, name):
         ("estimators", "from twin import Drive, TwinError"),
         ("estimators", "from twin.kernel import Car, correct, set_parameters, step"),
         ("estimators", "from .kalman import KalmanBucy\nfrom . import score\nimport twins"),
-        ("scenarios", "import estimators.score, mujoco, twin.vehicle"),
+        ("scenarios", "import estimators.score, mujoco, twin.car.vehicle"),
     ],
 )
 def test_allowed_import_is_left_alone(package, line):

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from estimators.identifiability import report
-from estimators.joint import JointObserver, JointSettings
-from scenarios import joint
-from scenarios.joint import Run, clean_drive, truth
-from scenarios.study import variation
+from estimators.identifiability.report import report
+from estimators.joint.observer import JointObserver, JointSettings
+from scenarios.experiment import joint
+from scenarios.experiment.joint import Run, clean_drive, truth
+from scenarios.experiment.study import variation
 from twin import LOAD, OUTPUTS, PARAMETERS, Fleet, Twin, TwinError, Vehicle, noise_sd
 from twin.kernel import read_states, step
 

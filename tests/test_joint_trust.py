@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from estimators.joint import JointObserver, JointSettings
-from estimators.joint_follow import follow
-from estimators.joint_memory import ABSENT, WAIT
-from estimators.joint_trust import doubt_linearity, wait_after_impact
-from scenarios.joint import clean_drive
-from scenarios.study import variation
+from estimators.joint.linearisation_error import doubt_linearity, wait_after_impact
+from estimators.joint.observer import JointObserver, JointSettings
+from estimators.joint.parameter_tracking import follow
+from estimators.joint.state import ABSENT, WAIT
+from scenarios.experiment.joint import clean_drive
+from scenarios.experiment.study import variation
 from twin import OUTPUTS, PARAMETERS, Vehicle
 
 SD = np.array([0.5] * 3 + [0.02] * 3 + [0.05] * 4)

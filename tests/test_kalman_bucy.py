@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimators.kalman_bucy import KalmanBucy, KalmanBucySettings, detecting, matched
+from estimators.benchmarks.kalman_bucy import KalmanBucy, KalmanBucySettings, detecting, matched
 from twin import TruckParameters, TwinError
 from twin.road import iso8608_road
-from twin.truck import LoadStage, Truck
-from twin.truck_parameters import SprungMass
+from twin.truck.model import LoadStage, Truck
+from twin.truck.parameters import SprungMass
 
 DT = 1e-3
 NOMINAL = TruckParameters().nominal.parameters

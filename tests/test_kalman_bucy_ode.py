@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimators.kalman_bucy import KalmanBucy, KalmanBucySettings, matched
-from estimators.kalman_bucy_ode import run_literal, run_riccati
-from scenarios.truck_drive import NOISE, TruckCase, make_drive
-from scenarios.truck_estimators import channels
+from estimators.benchmarks.kalman_bucy import KalmanBucy, KalmanBucySettings, matched
+from estimators.benchmarks.kalman_bucy_ode import run_literal, run_riccati
+from scenarios.papers.truck_drive import NOISE, TruckCase, make_drive
+from scenarios.papers.truck_estimators import channels
 from twin import TruckParameters, TwinError
-from twin.truck import DEFLECTIONS, RATES
-from twin.truck_twin import TRUCK_PARAMETERS
+from twin.truck.model import DEFLECTIONS, RATES
+from twin.truck.twin import TRUCK_PARAMETERS
 
 TRUCK, DT = TruckParameters(), 1e-3
 

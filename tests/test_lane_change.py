@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from scenarios.lane_change import lane_change, lanes, length, speeds_through, stretch
+from scenarios.driving.double_lane_change import lane_change, lanes, length, speeds_through, stretch
 
 WIDTH = 1.8
 

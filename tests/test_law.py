@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimators.law import PP, ParameterLaw, _regressor, advance_law, compile_laws
+from estimators.til.law import PP, ParameterLaw, _regressor, advance_law, compile_laws
 from twin import OUTPUTS, TwinError
 
 DT = 1e-3

@@ -4,12 +4,17 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from estimators.limits import OFFSETS, central_differences, limits, sensitivities
+from estimators.identifiability.cramer_rao import (
+    OFFSETS,
+    central_differences,
+    limits,
+    sensitivities,
+)
 from estimators.score import rms_pct
 from scenarios import mass
-from scenarios.catalogue import Settings
-from scenarios.limits import UNITS, law_limit, run
-from scenarios.study import Case, Run, limit, observe, real_drive, variation
+from scenarios.cli.catalogue import Settings
+from scenarios.experiment.study import Case, Run, limit, observe, real_drive, variation
+from scenarios.papers.limits import UNITS, law_limit, run
 from twin import OUTPUTS, PARAMETERS, Twin, TwinError, Vehicle, noise_sd
 
 AX = OUTPUTS.index("ax")

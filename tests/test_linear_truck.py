@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from linear_truck import simulate, state_space
 from scipy.integrate import solve_ivp
 
-from twin.linear_truck import simulate, state_space
-from twin.truck_parameters import SprungMass, TruckParameters
+from twin.truck.parameters import SprungMass, TruckParameters
 
 
 def equations_of_motion(x, road, truck=None):

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from twin import PARAMETERS
+from twin.car.load import PointMass, RigidBody, loaded, parameter_deltas, steiner
 from twin.errors import TwinError
-from twin.load import PointMass, RigidBody, loaded, parameter_deltas, steiner
 
 # TiL Table 1
 SUV = RigidBody(

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from scenarios.inspect_log import inspect_log
-from scenarios.log_checks import checks
-from scenarios.manoeuvres import swept_steer
-from scenarios.record import record
+from scenarios.driving.manoeuvres import swept_steer
+from scenarios.driving.record import record
+from scenarios.logs.checks import checks
+from scenarios.logs.inspect import inspect_log
 from twin import OUTPUTS, Vehicle
 
 

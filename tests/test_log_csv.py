@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twin.log_csv import read_log
+from twin.logs.csv import read_log
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from twin import Drive, TwinError, Vehicle
-from twin.car_file import template
-from twin.log_formats import format_of
-from twin.log_map import LogMap
+from twin.car.toml_car import template
+from twin.logs.formats import format_of
+from twin.logs.map import LogMap
 
 LONGEST = 10.0  # [s] that a small file may take
 MAP = (

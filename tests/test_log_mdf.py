@@ -7,7 +7,7 @@ import pytest
 from asammdf import MDF, Signal
 
 from twin import Drive, TwinError
-from twin.log_mdf import read_log
+from twin.logs.mdf import read_log
 
 NO_TIME = (None, None)
 

@@ -3,8 +3,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from scenarios.manoeuvres import random_road, swept_steer, urban
-from scenarios.study import TWIN
+from scenarios.driving.manoeuvres import random_road, swept_steer, urban
+from scenarios.experiment.study import TWIN
 from twin import Twin, Vehicle
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from estimators.observer import Observer
-from scenarios.manoeuvres import swept_steer
+from estimators.til.observer import Observer
+from scenarios.driving.manoeuvres import swept_steer
+from scenarios.driving.record import record
 from scenarios.mass import STUDY
-from scenarios.record import record
 from twin import FURTHER_OUTPUTS, INPUTS, OUTPUTS, WHEELS, Drive, Twin, TwinError, Vehicle
-from twin.log_map import TORQUES, LogMap
-from twin.units import GRAVITY
+from twin.logs.map import TORQUES, LogMap
+from twin.logs.units import GRAVITY
 
 RADIUS = 0.36
 

@@ -23,9 +23,9 @@ from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
 import models
-from scenarios.drivers import DRIVERS
-from scenarios.manoeuvres import Manoeuvre
-from scenarios.record import record
+from scenarios.driving.drivers import DRIVERS
+from scenarios.driving.manoeuvres import Manoeuvre
+from scenarios.driving.record import record
 from twin import Twin, Vehicle
 
 BMW = parameters_vehicle2()

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from twin.channels import OUTPUTS
-from twin.drive import Drive
 from twin.errors import TwinError
+from twin.logs.drive import Drive
 from twin.noise import noise_sd, with_noise
 
 SAMPLES = 20_000

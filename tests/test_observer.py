@@ -3,11 +3,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimators.observer import Observer
+from estimators.til.observer import Observer
 from scenarios import mass
-from scenarios.manoeuvres import urban
-from scenarios.record import record
-from scenarios.study import CM, variation
+from scenarios.driving.manoeuvres import urban
+from scenarios.driving.record import record
+from scenarios.experiment.study import CM, variation
 from twin import OUTPUTS, PARAMETERS, STATES, Twin, TwinError, Vehicle, with_noise
 
 DURATION = 12.0

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from cars import drive_of_other_car
 
-from estimators.limits import limits, sensitivities
-from estimators.offline_fit import offline_fit
+from estimators.identifiability.cramer_rao import limits, sensitivities
+from estimators.peers.offline_fit import offline_fit
 from twin import OUTPUTS, Twin, TwinError, Vehicle
 
 LOAD = {"mass": 200.0, "cm_x": -0.05, "Jzz": 300.0}

@@ -9,7 +9,7 @@ import pytest
 from distributed import Client, LocalCluster
 
 from scenarios import __main__ as cli
-from scenarios.progress import cluster, parallel
+from scenarios.experiment.progress import cluster, parallel
 from twin import TwinError
 
 ROOT = Path(__file__).parents[1]
@@ -73,7 +73,7 @@ def test_error_of_the_work_passes_through_the_cluster(address):
 
 
 def test_address_that_does_not_answer_is_one_line(silent_address, monkeypatch, capsys):
-    monkeypatch.setattr("scenarios.progress.TIMEOUT", 0.5)
+    monkeypatch.setattr("scenarios.experiment.progress.TIMEOUT", 0.5)
     assert cli.main(["run", "mass", "--dask", silent_address]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"til: --dask: {silent_address} is no cluster that answers within 0.5 s")
@@ -89,7 +89,7 @@ def test_address_that_is_none_is_refused(address):
 
 
 def test_scheduler_without_a_worker_is_refused(monkeypatch):
-    monkeypatch.setattr("scenarios.progress.TIMEOUT", 0.5)
+    monkeypatch.setattr("scenarios.experiment.progress.TIMEOUT", 0.5)
     with (
         LocalCluster(
             n_workers=0,

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from scenarios import __main__ as cli
-from scenarios.catalogue import REPRODUCTIONS, Entry
-from scenarios.report import PictureOf, Section, write_report
-from scenarios.result import Result, Row
+from scenarios.cli.catalogue import REPRODUCTIONS, Entry
+from scenarios.experiment.result import Result, Row
+from scenarios.report.html import PictureOf, Section, write_report
 
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="

@@ -11,8 +11,8 @@ import joblib
 import numpy as np
 import pytest
 
-from scenarios.progress import DELAY, parallel, progress
-from scenarios.result import Result, Row, json_text, replacing, write_json
+from scenarios.experiment.progress import DELAY, parallel, progress
+from scenarios.experiment.result import Result, Row, json_text, replacing, write_json
 
 LABELS = {
     "case": "noisy, correct CM",
@@ -191,6 +191,6 @@ def test_bar_appears_on_a_terminal_once_it_takes_long(monkeypatch, terminal, del
     stderr = io.StringIO()
     stderr.isatty = lambda: terminal
     monkeypatch.setattr(sys, "stderr", stderr)
-    monkeypatch.setattr("scenarios.progress.DELAY", delay)
+    monkeypatch.setattr("scenarios.experiment.progress.DELAY", delay)
     assert list(progress(range(3), "drives", 3)) == [0, 1, 2]
     assert ("drives" in stderr.getvalue()) == shown

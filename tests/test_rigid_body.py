@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.rigid_body import LEAST_SLACK, project, tensor
+from estimators.ensemble.rigid_body import LEAST_SLACK, project, tensor
 
 NOMINAL = np.array([2000.0, 0, 0, 0, 800.0, 3600.0, 3900.0, 0, 0, 0])
 INDEX = np.arange(10)

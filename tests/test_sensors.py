@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from scenarios.manoeuvres import swept_steer
-from scenarios.mismatch import BRAKE, DRIVE, MISMATCHES, real_drive, real_vehicle
-from scenarios.record import record
-from scenarios.sensors import Sensors, measured
+from scenarios.driving.manoeuvres import swept_steer
+from scenarios.driving.record import record
+from scenarios.plants.mismatch import BRAKE, DRIVE, MISMATCHES, real_drive, real_vehicle
+from scenarios.plants.sensors import Sensors, measured
 from twin import OUTPUTS, Drive, TwinError, Vehicle
 
 INFINITE = float("inf")

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from estimators import single_track
-from estimators.single_track import START, Geometry
+from estimators.benchmarks import single_track
+from estimators.benchmarks.single_track import START, Geometry
 from twin import Drive
 
 CAR = Geometry(mass=1000.0, front=1.3, rear=1.1, yaw_inertia=1300.0)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from estimators.observer import Observer
 from estimators.speed_follower import TORQUES, SpeedFollower, follow
+from estimators.til.observer import Observer
 from twin import INPUTS, OUTPUTS, STATES, Drive, Twin, TwinError, Vehicle
 
 FOLLOWER = SpeedFollower(

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from scenarios.circuit import circuit
-from scenarios.drivers import LIMITS
-from scenarios.path import Piece, follow_on, path_of
-from scenarios.speed_profile import GRAVITY, Limits, course_of, times
+from scenarios.driving.circuit import circuit
+from scenarios.driving.drivers import LIMITS
+from scenarios.driving.path import Piece, follow_on, path_of
+from scenarios.driving.speed_profile import GRAVITY, Limits, course_of, times
 
 PLAIN = Limits(
     lateral=1.0, accelerating=0.5, braking=0.8, speed=60.0, power=1e9, mass=1000.0, drag_area=0.0

@@ -3,12 +3,12 @@ import pytest
 from cars import drive_of_other_car
 from scipy.signal import lfilter
 
-from estimators.joint import PRIOR_SD
-from estimators.staged import CM, Stage, StagedSettings, staged
-from scenarios import study
-from scenarios.joint_drives import mixed
-from scenarios.joint_peers import STAGED_LAWS
-from scenarios.record import record
+from estimators.joint.observer import PRIOR_SD
+from estimators.peers.staged import CM, Stage, StagedSettings, staged
+from scenarios.driving.joint_drives import mixed
+from scenarios.driving.record import record
+from scenarios.experiment import study
+from scenarios.papers.joint_peers import STAGED_LAWS
 from twin import TwinError, Vehicle, noise_sd, with_noise
 
 # Short stages for a short drive

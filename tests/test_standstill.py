@@ -29,8 +29,8 @@ from cars import (
     times,
 )
 
-from scenarios.manoeuvres import Manoeuvre
-from scenarios.record import record
+from scenarios.driving.manoeuvres import Manoeuvre
+from scenarios.driving.record import record
 from twin import Vehicle
 
 GRADE = 0.15

@@ -6,13 +6,20 @@ import math
 import numpy as np
 import pytest
 
-from estimators import state_and_mass
-from estimators.law import advance_law, compile_laws
-from estimators.observer import Observer
-from scenarios import state_study
-from scenarios.catalogue import Settings
+from estimators.til import state_and_mass
+from estimators.til.law import advance_law, compile_laws
+from estimators.til.observer import Observer
+from scenarios.cli.catalogue import Settings
+from scenarios.experiment import state_study
+from scenarios.experiment.state_study import (
+    Run,
+    gains_of,
+    make_observer,
+    noisy_drive,
+    observe,
+    score,
+)
 from scenarios.laps import LAPS
-from scenarios.state_study import Run, gains_of, make_observer, noisy_drive, observe, score
 from twin import FORCES, OUTPUTS, TwinError
 
 INFINITE = math.inf

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from estimators import static_map
-from estimators.static_map import StaticMap
+from estimators.benchmarks import static_map
+from estimators.benchmarks.static_map import StaticMap
 
 T = np.arange(4000) * 0.01
 MASS, FRONT, REAR, STIFFNESS = 1000.0, 1.2, 1.4, 90e3  # of the rear axle [N/rad]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scenarios import mass, pitch, roll_yaw
-from scenarios.progress import parallel
-from scenarios.study import (
+from scenarios.experiment.progress import parallel
+from scenarios.experiment.study import (
     INFINITE,
     MASS,
     TWIN,

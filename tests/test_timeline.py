@@ -11,9 +11,10 @@ from rerun.chunk import RrdReader
 
 import twin
 from estimators.estimate import Estimate
-from estimators.staged import Stage, StagedEstimate
-from scenarios import timeline, timeline_3d
-from scenarios.timeline import view, write_timeline
+from estimators.peers.staged import Stage, StagedEstimate
+from scenarios.timeline import scene as timeline_3d
+from scenarios.timeline import timeline
+from scenarios.timeline.timeline import view, write_timeline
 
 SAMPLES = 2000
 ROAD = (0.05, 0.01, -0.02, 0.03)
@@ -346,7 +347,7 @@ def test_two_minutes_at_1_khz_stay_below_15_mb(tmp_path, vehicle):
 
 
 def test_importing_the_timeline_leaves_rerun_alone():
-    code = "import sys, scenarios.timeline; sys.exit('rerun' in sys.modules)"
+    code = "import sys, scenarios.timeline.timeline; sys.exit('rerun' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

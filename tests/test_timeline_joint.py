@@ -4,10 +4,10 @@ from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 import twin
-from estimators.joint import FAULT_SD, FAULTS, PRIOR_SD, JointEstimate
-from scenarios import timeline
-from scenarios.timeline_inertia import uniform_ellipsoid
-from scenarios.timeline_joint import write_joint_timeline
+from estimators.joint.observer import FAULT_SD, FAULTS, PRIOR_SD, JointEstimate
+from scenarios.timeline import timeline
+from scenarios.timeline.inertia import uniform_ellipsoid
+from scenarios.timeline.joint import write_joint_timeline
 
 RATE = 1000  # [Hz]
 ESTIMATED = (*twin.LOAD, *twin.SCALES, *FAULTS)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from scenarios import timeline_laps
-from scenarios.state_study import Run, observe
+from scenarios.experiment.state_study import Run, observe
+from scenarios.timeline import laps as timeline_laps
 from twin import TwinError
 
 RUNS = [

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import models
 from twin.errors import TwinError
-from twin.tir import LARGEST_FILE, REQUIRED, SCALING, TYRE_DTYPE, read_tyre
+from twin.tyre.tir import LARGEST_FILE, REQUIRED, SCALING, TYRE_DTYPE, read_tyre
 
 SUV = models.path("tyres/suv.tir").read_text()
 

@@ -1,13 +1,13 @@
+import linear_truck
 import mujoco
 import numpy as np
 import pytest
 
 import models
-from twin import linear_truck
 from twin.errors import TwinError
 from twin.road import iso8608_road
-from twin.truck import DEFLECTIONS, RATES, LoadStage, Truck
-from twin.truck_parameters import SprungMass, TruckParameters
+from twin.truck.model import DEFLECTIONS, RATES, LoadStage, Truck
+from twin.truck.parameters import SprungMass, TruckParameters
 
 PAPER_ORDER = [0, 1, 2, 3, 5, 4, 6]  # MuJoCo's joints as (Z, roll, pitch, Z_u f r, roll_u f r)
 

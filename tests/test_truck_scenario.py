@@ -5,14 +5,20 @@ import numpy as np
 import pytest
 
 from scenarios.__main__ import main
-from scenarios.catalogue import REPRODUCTIONS, reproduction
-from scenarios.truck_drive import NOISE, TruckCase, make_drive
-from scenarios.truck_estimators import ESTIMATORS, channels, some
-from scenarios.truck_score import PAPER, run_cases, score, settling_times
-from scenarios.truck_studies import ROBUSTNESS_CASES, TABLE_2_CASES, robustness, table_2, tuning
+from scenarios.cli.catalogue import REPRODUCTIONS, reproduction
+from scenarios.papers.truck_drive import NOISE, TruckCase, make_drive
+from scenarios.papers.truck_estimators import ESTIMATORS, channels, some
+from scenarios.papers.truck_score import PAPER, run_cases, score, settling_times
+from scenarios.papers.truck_studies import (
+    ROBUSTNESS_CASES,
+    TABLE_2_CASES,
+    robustness,
+    table_2,
+    tuning,
+)
 from twin import TwinError
-from twin.truck import RATES
-from twin.truck_twin import TRUCK_PARAMETERS
+from twin.truck.model import RATES
+from twin.truck.twin import TRUCK_PARAMETERS
 
 SHORT = TruckCase(duration=1.0)
 
@@ -208,7 +214,7 @@ def test_processes_change_no_figure():
 
 def test_figures_are_drawn_beside_the_papers_figures(tmp_path, monkeypatch):
     fast = ("kalman-bucy", "kalman-bucy-matched")
-    monkeypatch.setattr("scenarios.truck_figures.SHOWN", fast)
+    monkeypatch.setattr("scenarios.papers.truck_figures.SHOWN", fast)
     for name, quantities in (("kbf-figure-5", RATES), ("kbf-figure-6", TRUCK_PARAMETERS)):
         result = reproduction(name)(1, 1, tmp_path)
         assert result.name == name

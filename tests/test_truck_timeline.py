@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from estimators.kalman_bucy import Estimate
-from scenarios.timeline_truck import write_truck_timeline
-from scenarios.truck_drive import TruckCase, make_drive
-from scenarios.truck_estimators import ESTIMATORS
+from estimators.benchmarks.kalman_bucy import Estimate
+from scenarios.papers.truck_drive import TruckCase, make_drive
+from scenarios.papers.truck_estimators import ESTIMATORS
+from scenarios.timeline.truck import write_truck_timeline
 from twin import TwinError
-from twin.truck_parameters import SprungMass
+from twin.truck.parameters import SprungMass
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@ import pytest
 
 from twin import TruckParameters, TruckTwin, TwinError
 from twin.road import iso8608_road
-from twin.truck import LoadStage, Truck
-from twin.truck_parameters import SprungMass
+from twin.truck.model import LoadStage, Truck
+from twin.truck.parameters import SprungMass
 
 NOMINAL = SprungMass().parameters
 

@@ -5,9 +5,12 @@ import tomllib
 
 import pytest
 
-from scenarios import mass, roll_yaw, tune, tune_laws, tune_states
-from scenarios.catalogue import Tuning
-from scenarios.tune import Gain, Objective
+from scenarios import mass, roll_yaw
+from scenarios.cli.catalogue import Tuning
+from scenarios.tuning import laws as tune_laws
+from scenarios.tuning import states as tune_states
+from scenarios.tuning import tune
+from scenarios.tuning.tune import Gain, Objective
 from twin import TwinError
 
 GAINS = (
@@ -181,7 +184,7 @@ def test_what_the_states_cannot_be_tuned_by_is_named(tmp_path, changes, message)
 
 
 def test_costs_of_the_states_are_those_of_their_formulas(monkeypatch):
-    from scenarios.state_study import Score
+    from scenarios.experiment.state_study import Score
 
     one = Score(
         sideslip=0.2, mass=31.1858, mass_at_end=0.0, mass_last_10s=7.0, axle_force=(0.0, 0.0)

@@ -5,8 +5,13 @@ from hypothesis import strategies as st
 from numba import njit
 
 import models
-from twin.tir import ANY, LIMITS, REQUIRED, SCALING, TYRE_DTYPE, read_tyre
-from twin.tyre import effective_radius, magic_formula, relaxation_lengths, slip_stiffnesses
+from twin.tyre.magic_formula import (
+    effective_radius,
+    magic_formula,
+    relaxation_lengths,
+    slip_stiffnesses,
+)
+from twin.tyre.tir import ANY, LIMITS, REQUIRED, SCALING, TYRE_DTYPE, read_tyre
 
 NOMINAL = 6000.0  # F_z0 of the SUV's tyre [N]
 RADIUS = 0.369  # R_0 of the SUV's tyre [m]

@@ -10,9 +10,14 @@ from hypothesis import strategies as st
 
 import models
 from twin import Twin, TwinError, Vehicle
-from twin.tir import read_tyre
-from twin.tir_6 import EXTRA_SCALING, OPTIONAL, only_in_6, only_in_52
-from twin.tyre import effective_radius, magic_formula, relaxation_lengths, slip_stiffnesses
+from twin.tyre.magic_formula import (
+    effective_radius,
+    magic_formula,
+    relaxation_lengths,
+    slip_stiffnesses,
+)
+from twin.tyre.tir import read_tyre
+from twin.tyre.tir_6 import EXTRA_SCALING, OPTIONAL, only_in_6, only_in_52
 
 SUV = models.path("tyres/suv.tir").read_text()
 # Chosen: a plausible tyre, every term of MF 6 awake

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from cars import drive_of_other_car
 
-from estimators.joint import JointObserver, JointSettings
-from estimators.unscented import unscented
+from estimators.joint.observer import JointObserver, JointSettings
+from estimators.peers.unscented import unscented
 from twin import TwinError, Vehicle
 
 LOAD = {"mass": 200.0, "cm_x": -0.05, "Jzz": 300.0}

@@ -81,7 +81,7 @@ def test_wheel_holds_every_file_of_the_packages(wheel_names):
         for file in (ROOT / package).rglob("*")
         if file.is_file() and "__pycache__" not in file.parts
     }
-    assert {"models/suv.xml", "models/tyres/suv.tir", "twin/drive.py"} <= expected
+    assert {"models/suv.xml", "models/tyres/suv.tir", "twin/logs/drive.py"} <= expected
     assert {entry for entry in wheel_names if ".dist-info/" not in entry} == expected
 
 

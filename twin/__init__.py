@@ -6,6 +6,7 @@ What needs MuJoCo and compiled code is imported when it is first asked for.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from twin.car.load import PointMass, RigidBody, loaded, parameter_deltas
 from twin.channels import (
     EXTENDED,
     FORCES,
@@ -19,29 +20,28 @@ from twin.channels import (
     TYRE_OUTPUTS,
     WHEELS,
 )
-from twin.drive import Drive
 from twin.errors import TwinError
-from twin.fmu_names import FmuNames
-from twin.load import PointMass, RigidBody, loaded, parameter_deltas
+from twin.fmu.names import FmuNames
+from twin.logs.drive import Drive
 from twin.noise import noise_sd, with_noise
-from twin.truck_parameters import TruckParameters
+from twin.truck.parameters import TruckParameters
 
 if TYPE_CHECKING:
-    from twin.commonroad_twin import CommonRoadTwin
-    from twin.fleet import Fleet
-    from twin.fmu_twin import FmuTwin
-    from twin.truck_twin import TruckTwin
+    from twin.car.vehicle import Vehicle
+    from twin.commonroad.twin import CommonRoadTwin
+    from twin.ensemble import Fleet
+    from twin.fmu.twin import FmuTwin
+    from twin.truck.twin import TruckTwin
     from twin.twin import Snapshot, Twin, check_inputs
-    from twin.vehicle import Vehicle
 
 _COMPILED = {
-    "CommonRoadTwin": "twin.commonroad_twin",
-    "FmuTwin": "twin.fmu_twin",
-    "Fleet": "twin.fleet",
+    "CommonRoadTwin": "twin.commonroad.twin",
+    "FmuTwin": "twin.fmu.twin",
+    "Fleet": "twin.ensemble",
     "Snapshot": "twin.twin",
-    "TruckTwin": "twin.truck_twin",
+    "TruckTwin": "twin.truck.twin",
     "Twin": "twin.twin",
-    "Vehicle": "twin.vehicle",
+    "Vehicle": "twin.car.vehicle",
     "check_inputs": "twin.twin",
 }
 

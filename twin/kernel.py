@@ -1,8 +1,8 @@
-"""The black box: compiled functions that step, correct, set the parameters of a `twin.car.Car`.
+"""The black box: compiled functions that step, correct and set the parameters of a car.
 
 They are the whole boundary between an observer and the simulator; `read_states` and `is_sound`
 look without touching. All are `@njit`: Python and compiled loops call the same code, which is
-compiled once (`twin.boundary`). Arrays are contiguous, of float64.
+compiled once (`twin.compiled.boundary`). Arrays are contiguous, of float64.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import njit, types
 
-from twin.car import CAR
+from twin.car_record import CAR
 from twin.channels import FORCES
 from twin.parameters import set_load
 from twin.scales import set_scales

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.channels import OUTPUTS
-from twin.drive import Drive
 from twin.errors import TwinError
+from twin.logs.drive import Drive
 
 # A channel that a drive does not excite is not noise-free: the least standard deviations.
 ACCELERATION_FLOOR = 0.05  # [m/s2]

@@ -2,10 +2,10 @@
 
 from numba import types
 
-from twin.boundary import VECTOR, behind
-from twin.car import CAR
-from twin.lanes import inlined, pointer
-from twin.libmujoco import mju_eig3
+from twin.car_record import CAR
+from twin.compiled.boundary import VECTOR, behind
+from twin.compiled.libmujoco import mju_eig3
+from twin.compiled.simd import inlined, pointer
 
 # The least that is left of a chassis by corrections: of its mass, and of each principal moment.
 LEAST_SHARE = 0.3

@@ -11,11 +11,11 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from twin.boundary import VECTOR, behind
-from twin.car import AXLES, CAR, SCALED_TYRE
+from twin.car_record import AXLES, CAR, SCALED_TYRE
 from twin.channels import LOAD, SCALES, WHEELS
-from twin.four_tyres import NAMES
-from twin.lanes import pointer
+from twin.compiled.boundary import VECTOR, behind
+from twin.compiled.simd import pointer
+from twin.tyre.four_tyres import NAMES
 
 # Beyond these factors it is no longer the same car
 LEAST_SCALE, LARGEST_SCALE = 0.3, 3.0
@@ -49,7 +49,7 @@ _LMUX, _LMUY, _LKY, _LSGKP, _LSGAL = (NAMES.index(name) for name in SCALED_TYRE)
 
 
 def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
-    """Scales four records of `twin.tir.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
+    """Scales four records of `twin.tyre.tir.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
     for axle, wheels in _TYRES.items():
         for name, keys in TYRE_SCALES.items():
             factor = np.ones(len(WHEELS))

@@ -4,10 +4,10 @@ import math
 
 from numba import types
 
-from twin.boundary import VECTOR, behind
-from twin.car import CAR
-from twin.contact import combine, cross
-from twin.lanes import inlined, pointer
+from twin.car_record import CAR
+from twin.compiled.boundary import VECTOR, behind
+from twin.compiled.simd import inlined, pointer
+from twin.tyre.contact import combine, cross
 
 NQ, NV = 15, 14  # sizes of qpos and qvel of a car
 

@@ -4,14 +4,23 @@ import math
 
 from numba import types
 
-from twin.boundary import VECTOR, behind
-from twin.car import CAR
+from twin.car_record import CAR
 from twin.channels import FORCES, OUTPUTS, PARAMETERS, TYRE_OUTPUTS
-from twin.contact import LATERAL, LONGITUDINAL, ROAD, combine, cross, difference, dot, wheel_contact
-from twin.elementary import clip
-from twin.four_tyres import four_tyres
-from twin.lanes import gather, inlined, load, pointer, scatter, unpack
-from twin.libmujoco import mj_step1, mj_step2
+from twin.compiled.boundary import VECTOR, behind
+from twin.compiled.elementary import clip
+from twin.compiled.libmujoco import mj_step1, mj_step2
+from twin.compiled.simd import gather, inlined, load, pointer, scatter, unpack
+from twin.tyre.contact import (
+    LATERAL,
+    LONGITUDINAL,
+    ROAD,
+    combine,
+    cross,
+    difference,
+    dot,
+    wheel_contact,
+)
+from twin.tyre.four_tyres import four_tyres
 
 AIR_DENSITY = 1.2  # [kg/m3]
 STATES = 3  # columns of the tyre state

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin import kernel
-from twin.car import AXLES, DATA_VIEWS, MODEL_VIEWS, SCALED_TYRE, Car, new_car
+from twin.car.fingerprint import fingerprint
+from twin.car.vehicle import SENSORS, Vehicle
+from twin.car_record import AXLES, DATA_VIEWS, MODEL_VIEWS, SCALED_TYRE, Car, new_car
 from twin.channels import (
     EXTENDED,
     FORCES,
@@ -19,13 +21,11 @@ from twin.channels import (
     TYRE_OUTPUTS,
     WHEELS,
 )
-from twin.contact import ROAD
 from twin.errors import TwinError
-from twin.fingerprint import fingerprint
-from twin.four_tyres import table_of
 from twin.scales import TORQUES, bars
-from twin.tyre import effective_radius
-from twin.vehicle import SENSORS, Vehicle
+from twin.tyre.contact import ROAD
+from twin.tyre.four_tyres import table_of
+from twin.tyre.magic_formula import effective_radius
 
 Array = NDArray[np.float64]
 SETTLING_STEPS = 20

@@ -1,0 +1,1 @@
+"""Model-based estimators that the twin is measured against."""

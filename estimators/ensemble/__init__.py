@@ -1,0 +1,1 @@
+"""What observers share that run several twins."""

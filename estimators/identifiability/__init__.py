@@ -1,0 +1,1 @@
+"""What a drive can tell of a car at all: bounds, and words for them."""

@@ -1,0 +1,84 @@
+"""How far the joint observer trusts its sensitivities: they are differences, true only nearby.
+
+A sensitivity changes with the parameters by about its own size over a prior's standard deviation.
+As long as the estimates are uncertain, or far from the twins, that error is proportional to the
+sensitivities, lasts longer than a block, and would count as information in each of them; in
+the direction in which all masses, stiffnesses and torques grow together, and the motion hardly
+changes, it would be all the information there is. Its variance, of second order, adds to the noise
+and vanishes as the estimates become certain and the twins catch up.
+
+Two things are less smooth than that: a wheel about to lock, and a suspension that meets its stop.
+"""
+
+import numpy as np
+from numba import njit
+
+from estimators.joint.state import ABSENT, DRIVEN, LEAST_SPIN, NY, WAIT, WHEEL_SPEED
+
+
+@njit(cache=True, nogil=True)
+def doubt_linearity(setup, memory, h, variance):
+    """Adds to the noise (ny,) the variance of what the sensitivities h (ny, q) leave out."""
+    p = setup.parameter.size
+    uncertain, far = np.empty(p), 0.0
+    for i in range(p):
+        ahead = memory.z[i] - memory.theta[setup.parameter[i]]
+        uncertain[i] = memory.covariance[i, i] + ahead**2
+        far += uncertain[i] / setup.prior[i] ** 2
+    share = setup.block * setup.dt / setup.memory
+    for j in range(NY):
+        second = 0.0
+        for i in range(p):
+            memory.usual[j, i] += share * (h[j, i] ** 2 - memory.usual[j, i])
+            second += memory.usual[j, i] * uncertain[i]
+        if variance[j] < ABSENT:
+            variance[j] += setup.curvature * far * second
+            if j >= WHEEL_SPEED:
+                variance[j] += _slip_doubt(setup, memory, h, j)
+
+
+@njit(cache=True, nogil=True)
+def _own(h, j):
+    """(q,) sensitivity of a wheel's own speed: what the wheels have in common is the car's."""
+    own = h[j].copy()
+    for k in range(WHEEL_SPEED, NY):
+        own -= h[k] / (NY - WHEEL_SPEED)
+    return own
+
+
+@njit(cache=True, nogil=True)
+def _slip_doubt(setup, memory, h, j):
+    """Variance of what a wheel's speed is beside its sensitivity: it may lock, or not.
+
+    What the wheels have in common is the car's speed; the rest is slip. Near the peak of its tyre's
+    force a wheel's slip depends on everything, ten times more than usual, and not linearly.
+    """
+    own = _own(h, j)
+    ahead = 0.0
+    for i in range(setup.parameter.size):
+        ahead += own[i] * (memory.z[i] - memory.theta[setup.parameter[i]])
+    uncertain = own @ (memory.covariance @ own) + ahead**2
+    limit = setup.slip_range * max(memory.total[0, j] / setup.block, LEAST_SPIN)
+    return (uncertain / limit) ** 2
+
+
+@njit(cache=True, nogil=True)
+def _is_impact(setup, memory, h, variance):
+    """Whether sensitivities jump from block to block: the twins meet a stop one by one."""
+    for j in range(NY):
+        jump, usual = 0.0, 0.0
+        for i in range(setup.parameter.size):
+            certainty = memory.covariance[i, i]
+            jump += (h[j, i] - memory.before[j, i]) ** 2 * certainty
+            usual += memory.usual[j, i] * certainty
+        if jump > max(usual, setup.impact * variance[j]):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def wait_after_impact(setup, memory, h, variance):
+    """Has the observer wait a little after an impact."""
+    if memory.blocks[DRIVEN] > 0 and _is_impact(setup, memory, h, variance):
+        memory.blocks[WAIT] = round(setup.impact_wait / (setup.block * setup.dt))
+    memory.before[:] = h

@@ -1,0 +1,1 @@
+"""What the joint observer is measured against."""

@@ -1,0 +1,1 @@
+"""The Twin-in-the-Loop observer: laws, gains, validation of measurements, streaming."""

@@ -1,0 +1,1 @@
+"""Twins fitted to logs."""

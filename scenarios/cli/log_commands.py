@@ -1,0 +1,164 @@
+"""Commands of `til` for logs and other people's cars: inspect, new-car, calibrate, estimate."""
+
+from pathlib import Path
+
+import click
+
+from scenarios.cli import catalogue
+from scenarios.cli.options import (
+    Mistake,
+    Names,
+    OutputFile,
+    count_option,
+    dask_option,
+    jobs_option,
+    json_option,
+)
+from scenarios.cli.output import report
+
+
+@click.command()
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option(
+    "--map",
+    "map_path",
+    type=click.Path(path_type=Path),
+    metavar="MAP.toml",
+    help="Which channels of the log are ours.",
+)
+def inspect(log: Path, map_path: Path | None) -> None:
+    """Show what is in LOG (Parquet, CSV, MDF 4) and check its signs, units and delays."""
+    click.echo(catalogue.inspection()(log, map_path))
+
+
+@click.command("new-car")
+@click.argument("name")
+def new_car(name: str) -> None:
+    """Write NAME.toml, a commented description of a car to fill in."""
+    click.echo(f"{catalogue.new_car()(name)} describes a car: change what you know of yours.")
+
+
+@click.command()
+@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, or an MJCF file.")
+@click.option("--free", required=True, type=Names(), metavar="NAME,...", help="What is fitted.")
+@click.option(
+    "--fit",
+    "signals",
+    type=Names(),
+    metavar="NAME,...",
+    default="ay,yaw_rate",
+    show_default=True,
+    help="Signals that the twin is to show as the log does; sideslip is that of the log's truth.",
+)
+@click.option("--from", "first", type=float, metavar="S", help="First time used.")
+@click.option("--to", "last", type=float, metavar="S", help="Last time used.")
+@count_option("--evaluations", 20, "How many steps at most.")
+@jobs_option
+@click.option(
+    "--out", type=OutputFile(suffix=".toml"), metavar="FILE", help="[default: out/calibrate.toml]"
+)
+@json_option
+def calibrate(
+    log: Path,
+    vehicle: str,
+    free: tuple[str, ...],
+    signals: tuple[str, ...],
+    first: float | None,
+    last: float | None,
+    evaluations: int,
+    jobs: int,
+    out: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Fit the twin of a car to LOG, a recorded drive, by bounded least squares.
+
+    FILE holds values, their 95 % confidence intervals and where they come from. A factor of 1 and a
+    delta or offset of 0 are what the car's files say. Where the log has no torques the twin
+    follows its measured vx, and the mass is not observable.
+    """
+    path = out or Path("out", "calibrate.toml")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    calibration = catalogue.calibrate()
+    task = calibration.task_of(log, vehicle, free, signals, (first, last))
+    report(calibration.run(task, log, path, jobs=jobs, evaluations=evaluations), json_path)
+
+
+@click.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True)
+@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, MJCF or TOML file.")
+@click.option(
+    "--map",
+    "map_path",
+    type=click.Path(path_type=Path),
+    metavar="MAP.toml",
+    help="Which channels of the logs are ours; a drive of ours needs none.",
+)
+@click.option(
+    "--estimator",
+    "estimators",
+    type=click.Choice(["til", "joint"]),
+    multiple=True,
+    default=("til",),
+    show_default=True,
+    help="til: states, sideslip and mass; joint: all load parameters, tyres, springs. Repeatable.",
+)
+@jobs_option
+@dask_option
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    default="out",
+    show_default=True,
+    help="Folder for timelines, histories and finished results; every job must reach it.",
+)
+@click.option(
+    "--state",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Of a stream: go on where FILE was left, and leave it again at the end.",
+)
+@json_option
+def estimate(
+    logs: tuple[str, ...],
+    vehicle: str,
+    map_path: Path | None,
+    estimators: tuple[str, ...],
+    jobs: int,
+    dask: str | None,
+    out: Path,
+    state: Path | None,
+    json_path: Path | None,
+) -> int:
+    """Observe recorded drives: LOG is Parquet, CSV or MDF 4, or - for standard input.
+
+    Of each LOG DIR receives NAME.ESTIMATOR.rrd, the timeline; .parquet, the estimates over time;
+    and .json, the result. A second call skips what is finished there, unless the log, the map, the
+    car or a version has changed. Truth in a log is only scored against. A bad log does not stop the
+    others; the exit status is then 2.
+
+    From standard input come samples, one JSON object a line or CSV with a row of names: time [s],
+    inputs and measurements by our names or the map's, at any rate. Estimates go to standard output
+    as they come, one JSON object a line.
+    """
+    from scenarios.experiment.progress import cluster  # not at the top: it imports joblib
+
+    if "-" in logs:
+        if len(logs) > 1 or json_path or estimators != ("til",) or dask:
+            raise Mistake("estimate: a stream, -, stands alone; allowed: --map, --vehicle, --state")
+        return catalogue.estimate_stream().run(vehicle, map_path, state)
+    if state:
+        raise Mistake("--state: is that of a stream; allowed: LOG is -")
+    with cluster(dask):
+        result, text, bad = catalogue.estimate().run(
+            [Path(log) for log in logs],
+            vehicle=vehicle, map_path=map_path, estimators=estimators, jobs=jobs, out=out,
+        )  # fmt: skip
+    report(result, json_path, f"{text}\n\n{result.table()}" if result.rows else text)
+    for line in bad:
+        click.echo(f"til: {line}", err=True)
+    return 2 if bad else 0
+
+
+COMMANDS = (inspect, new_car, calibrate, estimate)

@@ -1,0 +1,1 @@
+"""Drivers, paths, manoeuvres and their recording."""

@@ -1,0 +1,1 @@
+"""Experiments: what is driven, what is estimated, and how it is scored."""

@@ -1,0 +1,1 @@
+"""Recorded logs: inspected and observed."""

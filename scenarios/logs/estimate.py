@@ -1,0 +1,329 @@
+"""Recorded drives, observed one by one: `til estimate`.
+
+What is finished is kept: each log has a JSON file in the folder, with a fingerprint of the log, its
+map, the vehicle and the estimator. A batch that was interrupted goes on where it stopped.
+"""
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.score import rms_pct
+from scenarios.experiment.progress import parallel
+from scenarios.experiment.result import Result, Row, json_text, replacing, versions
+from scenarios.logs.estimators import ESTIMATORS, Found, unit_of
+from scenarios.logs.pieces import lacking, measured, prepared
+from twin import PARAMETERS, Drive, TwinError, Vehicle
+from twin.car.fingerprint import fingerprint
+from twin.logs.mapped_log import NEEDS
+from twin.toml_file import reason
+
+Array = NDArray[np.float64]
+
+SLOWEST = 1.0  # [m/s]; below it sideslip is reckoned as at this speed, as its angle means nothing
+_KEPT = ("mass", "vx", "vy", "yaw_rate", "roll", "pitch")  # what else the history holds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One log and what is done with it.
+
+    Attributes:
+        log: the file.
+        map: of its channels; None: it is a drive of ours.
+        vehicle: name or file.
+        estimator: of `ESTIMATORS`.
+        out: where files go, and how they are called: `out / name`.
+        name: without ending.
+    """
+
+    log: Path
+    map: Path | None
+    vehicle: str
+    estimator: str
+    out: Path
+    name: str
+
+    def file(self, ending: str) -> Path:
+        """Of the folder, by its ending."""
+        return self.out / f"{self.name}.{self.estimator}{ending}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What became of a log.
+
+    Attributes:
+        log: as it was given.
+        fingerprint: see `fingerprint_of`.
+        rows: figures.
+        done: sentences: what was done with the log, and what cannot be estimated.
+        trustworthy: whether the estimates are at the end; None where nobody looked.
+        kept: whether a run before this one made it.
+        error: one line if it failed, else empty.
+    """
+
+    log: str
+    fingerprint: str = ""
+    rows: tuple[Row, ...] = ()
+    done: tuple[str, ...] = ()
+    trustworthy: bool | None = None
+    kept: bool = False
+    error: str = ""
+
+
+def run(
+    logs: Sequence[Path],
+    *,
+    vehicle: str,
+    map_path: Path | None,
+    estimators: Sequence[str],
+    jobs: int,
+    out: Path,
+) -> tuple[Result, str, list[str]]:
+    """Observes logs; returns the result, what was done as text, and a line for each bad log.
+
+    Raises:
+        TwinError: the vehicle's files are missing or broken, or the folder cannot be written.
+    """
+    start = time.perf_counter()
+    Vehicle.load(vehicle)  # before any log is read
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TwinError(f"{out}: cannot be written: {error.strerror}") from error
+    tasks = [
+        Task(log=log, map=map_path, vehicle=vehicle, estimator=estimator, out=out, name=name)
+        for log, name in zip(logs, _names(logs), strict=True)
+        for estimator in dict.fromkeys(estimators)
+    ]
+    outcomes = parallel(observe, tasks, jobs, "estimate")
+    result = Result(
+        name="estimate",
+        settings={
+            "vehicle": vehicle,
+            "map": map_path,
+            "logs": [_told(task, outcome) for task, outcome in zip(tasks, outcomes, strict=True)],
+        },
+        seconds=time.perf_counter() - start,
+        rows=[row for outcome in outcomes for row in outcome.rows],
+    )
+    text = "\n".join(_as_text(task, one) for task, one in zip(tasks, outcomes, strict=True))
+    return result, text, [one.error for one in outcomes if one.error]
+
+
+def observe(task: Task) -> Outcome:
+    """One log, if it is not done already: writes timeline, history and, last, the result."""
+    try:
+        mark = fingerprint_of(task)
+        before = _read(task, mark)
+        if before is not None:
+            return before
+        found, done = _found(task)
+        outcome = Outcome(
+            log=str(task.log),
+            fingerprint=mark,
+            rows=tuple(_rows(task, found)),
+            done=(*done, *found.done),
+            trustworthy=_at_end(found),
+        )
+        _write_timeline(task, found)
+        _write_history(task, found)
+        content = asdict(outcome) | {"rows": [asdict(row) for row in outcome.rows]}
+        with replacing(task.file(".json")) as partial:
+            partial.write_text(json_text(_finite(content)) + "\n", encoding="utf-8")
+        return outcome
+    except (TwinError, OSError) as error:
+        why = reason(error) if isinstance(error, OSError) else " ".join(str(error).split())
+        named = why if str(task.log) in why else f"{task.log}: {why}"
+        return Outcome(log=str(task.log), error=named)
+
+
+def fingerprint_of(task: Task) -> str:
+    """Hash of all that decides the result: log, map, vehicle, estimator and versions.
+
+    Raises:
+        TwinError: a file cannot be read.
+    """
+    content = hashlib.sha256(fingerprint(Vehicle.load(task.vehicle)).encode())
+    content.update(json.dumps([task.estimator, versions()]).encode())
+    for path in (task.log, task.map):
+        if path is None:
+            continue
+        try:
+            with path.open("rb") as file:
+                content.update(hashlib.file_digest(file, "sha256").digest())
+        except OSError as error:
+            raise TwinError(f"{path}: cannot be read: {error.strerror}") from error
+    return content.hexdigest()
+
+
+def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
+    """What the estimator finds, and what was done before."""
+    vehicle = Vehicle.load(task.vehicle)
+    drive = Drive.load(task.log, task.map)
+    log = prepared(drive, float(vehicle.compile().opt.timestep))
+    told = tuple(drive.settings.get("log", {}).get("done", ()))
+    if not told:
+        names = measured(log.pieces)
+        wanted = {quantity: lacking(quantity, names) for quantity in NEEDS}
+        told = tuple(
+            f"{quantity} cannot be estimated without {', '.join(missing)}."
+            for quantity, missing in wanted.items()
+            if missing
+        )
+    return ESTIMATORS[task.estimator](vehicle, log), (*told, *log.done)
+
+
+def _rows(task: Task, found: Found) -> list[Row]:
+    """Final estimates, their standard deviations, and scores where there is truth."""
+    rows: list[Row] = []
+
+    def add(quantity: str, metric: str, unit: str, value: float) -> None:
+        rows.append(
+            Row.over_seeds(
+                [value], case=task.name, quantity=quantity, metric=metric, unit=unit,
+                estimator=task.estimator,
+            )
+        )  # fmt: skip
+
+    drive, estimate = found.drive, found.estimate
+    for name in found.parameters:
+        add(name, "final", unit_of(name), float(estimate[name][-1]))
+        if name in found.sd:
+            add(name, "sd", unit_of(name), found.sd[name])
+        truth = float(drive.truth.get(name, np.array([np.nan]))[-1])
+        delta = truth - float(estimate.nominal[PARAMETERS.index(name)])
+        if np.isfinite(delta):
+            add(name, "error", unit_of(name), float(estimate[name][-1]) - delta)
+            if abs(delta) > 1e-9:
+                step = float(np.median(np.diff(drive.time)))
+                add(name, "rms_pct", "%", rms_pct(estimate[name], delta, step))
+    if not lacking("sideslip", measured([drive])):
+        slip = np.degrees(sideslip(found))
+        add("sideslip", "final", "deg", float(slip[-1]))
+        add("sideslip", "largest", "deg", float(np.abs(slip).max()))
+        if "sideslip" in drive.truth:
+            add("sideslip", "rmse", "deg", _rmse(slip, np.degrees(drive.truth["sideslip"]), found))
+    add("vx", "final", "m/s", float(estimate["vx"][-1]))
+    if "vx" in drive.truth:
+        add("vx", "rmse", "m/s", _rmse(estimate["vx"], drive.truth["vx"], found))
+    if estimate.trustworthy is not None:
+        add("all", "trustworthy", "%", 100.0 * float(estimate.trustworthy.mean()))
+    return rows
+
+
+def sideslip(found: Found) -> Array:
+    """(N,) of the twin's IMU [rad]."""
+    estimate = found.estimate
+    return np.arctan2(estimate["vy"], np.maximum(estimate["vx"], SLOWEST))
+
+
+def _rmse(estimate: Array, truth: Array, found: Found) -> float:
+    """Where the car moves and the truth is known."""
+    good = np.isfinite(truth) & (found.estimate["vx"] > SLOWEST)
+    return float(np.sqrt(np.mean((estimate - truth)[good] ** 2))) if good.any() else float("nan")
+
+
+def _at_end(found: Found) -> bool | None:
+    trustworthy = found.estimate.trustworthy
+    return None if trustworthy is None else bool(trustworthy[-1])
+
+
+def _write_timeline(task: Task, found: Found) -> None:
+    from scenarios.timeline.timeline import write_timeline  # not at the top: it imports Rerun
+
+    write_timeline(
+        task.file(".rrd"),
+        vehicle=Vehicle.load(task.vehicle),
+        drive=found.drive,
+        estimate=found.estimate,
+        parameters=found.parameters,
+        title=f"{task.name}, {task.estimator}",
+    )
+
+
+def _write_history(task: Task, found: Found) -> None:
+    """Estimates over time as Parquet: time, parameters, states, and whether to trust them."""
+    import pyarrow as pa  # not at the top, as ever
+    import pyarrow.parquet as pq
+
+    estimate = found.estimate
+    names = dict.fromkeys((*found.parameters, *_KEPT))
+    columns: dict[str, Any] = {"time": estimate.time, "sideslip": sideslip(found)}
+    columns |= {name: estimate[name] for name in names}
+    if estimate.trustworthy is not None:
+        columns["trustworthy"] = estimate.trustworthy
+    with replacing(task.file(".parquet")) as partial:
+        pq.write_table(pa.table(columns), partial)
+
+
+def _read(task: Task, mark: str) -> Outcome | None:
+    """What a run before made of the same; None if there is none or something has changed."""
+    path = task.file(".json")
+    if not all(task.file(ending).is_file() for ending in (".json", ".rrd", ".parquet")):
+        return None
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["fingerprint"] != mark:
+            return None
+        rows = tuple(Row(**_numbers(row)) for row in content.pop("rows"))
+        content |= {"rows": rows, "done": tuple(content["done"]), "kept": True}
+        return Outcome(**content)
+    except (ValueError, TypeError, KeyError):
+        return None
+
+
+def _finite(value: Any) -> Any:
+    """What JSON can hold: no NaN, no infinity."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _numbers(row: dict[str, Any]) -> dict[str, Any]:
+    """A row as JSON keeps it, with NaN again for a figure that was none."""
+    return row | {key: np.nan for key in ("median", "p90") if row[key] is None}
+
+
+def _names(logs: Sequence[Path]) -> list[str]:
+    """A name for each log's files: its own, with its folders where two logs share one."""
+    stems = [log.stem for log in logs]
+    if len(set(stems)) == len(stems):
+        return stems
+    try:
+        root = os.path.commonpath([log.resolve().parent for log in logs])
+    except ValueError:
+        root = "/"
+    names = ["-".join(log.resolve().relative_to(root).parts) for log in logs]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise TwinError(f"{repeated[0]}: is given twice; allowed: each log once")
+    return names
+
+
+def _told(task: Task, outcome: Outcome) -> dict[str, Any]:
+    told = {key: value for key, value in asdict(outcome).items() if key != "rows"}
+    return told | {"name": task.name, "estimator": task.estimator}
+
+
+def _as_text(task: Task, outcome: Outcome) -> str:
+    """What was done with a log, line by line."""
+    if outcome.error:
+        return f"{task.log}: failed"
+    kept = f"kept from before, in {task.file('.json')}" if outcome.kept else ""
+    end = {True: "at the end the estimates are trustworthy", None: "",
+           False: "AT THE END THE ESTIMATES ARE NOT TRUSTWORTHY"}[outcome.trustworthy]  # fmt: skip
+    notes = ", ".join(part for part in (end, kept) if part)
+    title = f"{task.log}, {task.estimator}" + (f": {notes}" if notes else "")
+    return "\n".join([title, *(f"  {line}" for line in outcome.done)])

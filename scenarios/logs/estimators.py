@@ -1,0 +1,134 @@
+"""The estimators that recorded drives are given to."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.estimate import Estimate
+from estimators.joint.observer import JointObserver, JointSettings
+from estimators.til.observer import Observer
+from estimators.til.stream import rolling_radius
+from scenarios.calibration.calibrate import driven
+from scenarios.logs.default_observer import default_observer
+from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
+from twin import LOAD, OUTPUTS, SCALES, Drive, Twin, TwinError, Vehicle
+
+Array = NDArray[np.float64]
+# Least noise that a sensor is believed to have, as in the simulated drives
+_LEAST_NOISE = (0.05, 0.05, 0.05, 0.003, 0.003, 0.003, 0.05, 0.05, 0.05, 0.05)
+
+
+class Found(NamedTuple):
+    """What an estimator made of a log.
+
+    Attributes:
+        drive: the log in the twin's channels and steps, pieces one behind the other.
+        estimate: over it.
+        parameters: that were estimated.
+        sd: standard deviation at the end, where the estimator knows it.
+        done: sentences.
+    """
+
+    drive: Drive
+    estimate: Estimate
+    parameters: tuple[str, ...]
+    sd: dict[str, float]
+    done: tuple[str, ...]
+
+
+def til(vehicle: Vehicle, log: Prepared) -> Found:
+    """States and mass by the default observer.
+
+    Raises:
+        TwinError: an input is out of range, or the twin has blown up.
+    """
+    names = measured(log.pieces)
+    wanted = lacking("mass", names)
+    follower = driven(vehicle) if log.follows else None
+    default = default_observer(vehicle, names, mass=not wanted, follower=follower)
+    estimates = []
+    for piece in log.pieces:
+        speed = start_speed(piece, default.rolling_radius)
+        if estimates:
+            default.observer.restart(speed)
+        else:
+            default.observer.reset(speed)
+        estimates.append(default.observer.run(piece))
+    return Found(
+        drive=_joined_drives(log.pieces),
+        estimate=_joined(estimates),
+        parameters=default.parameters,
+        sd=default.observer.parameter_sd(),
+        done=default.left_out,
+    )
+
+
+def joint(vehicle: Vehicle, log: Prepared) -> Found:
+    """All load parameters, tyres, springs and dampers at once, with their covariance.
+
+    Raises:
+        TwinError: the log has no torques or long gaps, or a twin has blown up.
+    """
+    if log.follows:
+        raise TwinError("the joint estimator needs torques; allowed: --estimator til")
+    if len(log.pieces) > 1:
+        raise TwinError("the joint estimator takes no gaps of this length; allowed: til")
+    piece = _joined_drives(log.pieces)
+    names = measured(log.pieces)
+    noise = np.where([name in names for name in OUTPUTS], _noise_sd(piece), np.nan)
+    observer = JointObserver(vehicle, noise, JointSettings(parameters=(*LOAD, *SCALES)))
+    observer.reset(start_speed(piece, rolling_radius(Observer(Twin(vehicle), []))))
+    plain = piece.replace(measurements=piece.measurements[:, : len(OUTPUTS)], output_names=OUTPUTS)
+    estimate = observer.run(plain)
+    parameters = observer.settings.parameters
+    sd = dict(zip(estimate.estimated, estimate.sd[-1].tolist(), strict=True))
+    return Found(piece, estimate, parameters, {name: sd[name] for name in parameters}, ())
+
+
+ESTIMATORS: dict[str, Callable[[Vehicle, Prepared], Found]] = {"til": til, "joint": joint}
+
+
+def unit_of(parameter: str) -> str:
+    """Of a parameter of `twin.PARAMETERS`."""
+    return "1" if parameter in SCALES else {"m": "kg", "c": "m", "J": "kg m2"}[parameter[0]]
+
+
+def _noise_sd(drive: Drive) -> Array:
+    """(10,) of white noise: from second differences, whose variance is six times the noise's."""
+    known = drive.settings.get("noise_sd")
+    if isinstance(known, dict) and set(OUTPUTS) <= set(known):
+        found = np.array([known[name] for name in OUTPUTS], dtype=np.float64)
+    else:
+        bends = np.abs(np.diff(drive.measurements[:, : len(OUTPUTS)], n=2, axis=0))
+        bends = np.where(np.isfinite(bends), bends, 0.0)
+        found = 1.4826 * np.median(bends, axis=0) / np.sqrt(6.0)
+    return np.maximum(found, _LEAST_NOISE)
+
+
+def _joined_drives(pieces: Sequence[Drive]) -> Drive:
+    first = pieces[0]
+    if len(pieces) == 1:
+        return first
+    return first.replace(
+        time=np.concatenate([piece.time for piece in pieces]),
+        inputs=np.concatenate([piece.inputs for piece in pieces]),
+        measurements=np.concatenate([piece.measurements for piece in pieces]),
+        truth={name: np.concatenate([p.truth[name] for p in pieces]) for name in first.truth},
+    )
+
+
+def _joined(estimates: Sequence[Estimate]) -> Estimate:
+    def all_of(name: str) -> Array:
+        return np.concatenate([getattr(estimate, name) for estimate in estimates])
+
+    return Estimate(
+        time=all_of("time"),
+        states=all_of("states"),
+        parameters=all_of("parameters"),
+        outputs=all_of("outputs"),
+        extended=all_of("extended"),
+        nominal=estimates[0].nominal,
+        trustworthy=all_of("trustworthy").astype(np.bool_),
+    )

@@ -1,0 +1,106 @@
+"""What is in a log: channels, rates, gaps and units, and whether its signs can be right."""
+
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.logs.checks import Check, checks
+from twin import Drive
+from twin.logs.drive import NoDrive
+from twin.logs.formats import format_of
+from twin.logs.raw_log import Channel, RawLog
+from twin.logs.resampling import gaps
+from twin.logs.units import CHANNELS, our_unit
+
+
+def inspect_log(path: Path, map_path: Path | None) -> str:
+    """The text that `til inspect` prints.
+
+    Raises:
+        TwinError: the log or the map cannot be read, or they do not fit.
+    """
+    if map_path is None:
+        try:
+            return _of_drive(path, Drive.load(path))
+        except NoDrive:
+            log = format_of(path).read_log(path, (None, None))
+        return _channels(log) + (
+            "\n\nNo checks: the log is of another program, and a map (--map) tells its channels."
+        )
+    from twin.logs.map import LogMap
+    from twin.logs.mapped_log import drive_of
+
+    log_map = LogMap.load(map_path)
+    log = format_of(path).read_log(path, (log_map.time_name, log_map.time_unit))
+    drive = drive_of(log, log_map)
+    done = "\n".join(f"  {line}" for line in drive.settings["log"]["done"])
+    return f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive)}"
+
+
+def _of_drive(path: Path, drive: Drive) -> str:
+    names = (*drive.input_names, *drive.output_names)
+    channels = {
+        name: Channel(
+            time=drive.time,
+            values=drive.channel(name),
+            unit=our_unit(name) if name in CHANNELS else "",
+        )
+        for name in names
+    }
+    return f"{_channels(RawLog(path=path, channels=channels))}\n\n{_checks(drive)}"
+
+
+def _channels(log: RawLog) -> str:
+    header = ("channel", "unit", "rate [Hz]", "samples", "missing", "gaps", "longest gap [s]")
+    rows = [(*header, "least", "median", "largest")]
+    rows += [(name, *_row(channel)) for name, channel in log.channels.items()]
+    rows += [(name, f"no number: {kind}") for name, kind in log.text.items()]
+    times = [channel.time for channel in log.channels.values()]
+    start, end = min(t[0] for t in times), max(t[-1] for t in times)
+    title = f"{log.path}: {len(log.channels)} channels from {start:.6g} to {end:.6g} s"
+    return "\n".join([title, *log.notes, _aligned(rows)])
+
+
+def _row(channel: Channel) -> tuple[str, ...]:
+    good = np.isfinite(channel.values)
+    values, time = channel.values[good], channel.time[good]
+    span = channel.time[-1] - channel.time[0]
+    rate = f"{(channel.time.size - 1) / span:.5g}" if span > 0.0 else "-"
+    found = gaps(time) if time.size > 1 else []
+    longest = f"{max(length for _, length in found):.3g}" if found else "-"
+    spread = (
+        [f"{number(values):.4g}" for number in (np.min, np.median, np.max)] if good.any() else []
+    )
+    return (
+        channel.unit or "?",
+        rate,
+        str(channel.time.size),
+        str(int((~good).sum())),
+        str(len(found)),
+        longest,
+        *spread,
+    )
+
+
+def _checks(drive: Drive) -> str:
+    rows = [("check", "correlation", "slope", "unit", "lag [s]", "verdict")]
+    rows += [_shown(check) for check in checks(drive)]
+    return _aligned(rows)
+
+
+def _shown(check: Check) -> tuple[str, ...]:
+    numbers = (f"{check.correlation:.3f}", f"{check.slope:.4g}", f"{check.lag:.2f}")
+    correlation, slope, lag = ("-" if text == "nan" else text for text in numbers)
+    return (check.name, correlation, slope, check.unit, lag, check.verdict)
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> str:
+    """Rows as columns, two spaces between them; what is longer than the header stands alone."""
+    columns = len(rows[0])
+    full = [row for row in rows if len(row) == columns]
+    widths = [max(len(row[i]) for row in full) for i in range(columns)]
+    widths[0] = max(len(row[0]) for row in rows)
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
+        for row in rows
+    )

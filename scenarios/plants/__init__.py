@@ -1,0 +1,1 @@
+"""Real vehicles: what the twin does not know of."""

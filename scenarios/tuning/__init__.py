@@ -1,0 +1,1 @@
+"""Gains chosen from data."""

@@ -1,0 +1,1 @@
+"""A car as its files describe it: MJCF, TOML, loads."""

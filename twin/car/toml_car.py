@@ -1,0 +1,230 @@
+"""A car described in one TOML file, as an MJCF: `twin.car.fields` says which fields there are."""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+import models
+from twin.car.fields import SECTIONS, Field, Section
+from twin.car.mjcf import tyre_path
+from twin.errors import TwinError
+from twin.toml_file import Table, read_toml, reason
+from twin.tyre.magic_formula import relaxation_lengths, slip_stiffnesses
+from twin.tyre.tir import read_tyre
+
+GRAVITY = 9.81  # [m/s2], as in models/suv.xml
+
+Car = dict[str, dict[str, Any]]
+"""Values by section and field; None where an optional one is left out."""
+
+
+def read_car(path: Path) -> Car:
+    """Reads and checks a car.
+
+    Raises:
+        TwinError: the file is missing or broken, or a field is unknown, of another type or out of
+            range.
+    """
+    table = read_toml(path)
+    _check_tables(table)
+    return {section.name: _read_section(table, section) for section in SECTIONS}
+
+
+def car_spec(path: Path) -> mujoco.MjSpec:
+    """A car of a file, as an editable MJCF: the project's SUV with every number of the file.
+
+    The chassis frame stands at the IMU. Springs are as long as it takes to stand level.
+
+    Raises:
+        TwinError: as `read_car`.
+    """
+    car = read_car(path)
+    spec = mujoco.MjSpec.from_file(str(models.path("suv")))
+    spec.modelname = path.stem
+    _set_chassis(spec, car)
+    for axle, tyre in zip(("front", "rear"), car_tyres(path), strict=True):
+        _set_axle(spec, car, axle, float(tyre["unloaded_radius"]))
+    steering, air = car["steering"], car["aerodynamics"]
+    numbers = {"steering_ratio": steering["ratio"], "ackermann": steering["ackermann"], **air}
+    for name, value in numbers.items():
+        spec.numeric(name).data = [value]
+    return spec
+
+
+def car_tyres(path: Path) -> np.ndarray:
+    """Coefficients of the front and the rear tyre, (2,) records.
+
+    Raises:
+        TwinError: as `read_car`, or a .tir file is missing or broken.
+    """
+    car = read_car(path)
+    return np.array([_tyre(path, car, axle) for axle in ("front", "rear")])
+
+
+def write_template(name: str) -> Path:
+    """Writes NAME.toml, every field with its unit, range and default; returns its path.
+
+    Raises:
+        TwinError: there is such a file already, or it cannot be written.
+    """
+    path = Path(name if name.endswith(".toml") else f"{name}.toml")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(template(path.stem))
+    except FileExistsError as error:
+        raise TwinError(f"{path}: is there already; allowed: a name that is not taken") from error
+    except (OSError, ValueError) as error:
+        raise TwinError(f"{path}: cannot be written: {reason(error)}") from error
+    return path
+
+
+def template(title: str) -> str:
+    """The text of a car's file with all defaults, which are the SUV's."""
+    lines = [
+        f"# {title}: a car for `til ... --vehicle {title}.toml`. SI units; axes of ISO 8855 (x",
+        "# forward, y left, z up). A field that is left out has the value it has here.",
+    ]
+    for section in SECTIONS:
+        lines += ["", f"[{section.name}]", *(f"# {line}" for line in section.text if line)]
+        lines += [_line(field, section.optional) for field in section.fields]
+    return "\n".join(lines) + "\n"
+
+
+def _line(field: Field, optional: bool) -> str:
+    if isinstance(field.default, str):
+        return f'{field.name} = "{field.default}"  # {field.text}'
+    unit = "" if field.unit == "1" else f" {field.unit}"
+    text = f"; {field.text}" if field.text else ""
+    assignment = f"{'# ' if optional else ''}{field.name} = {field.default!r}"
+    return f"{assignment:34}# {field.least:g} to {field.largest:g}{unit}{text}"
+
+
+def _check_tables(table: Table) -> None:
+    """Checks the names of the tables and of the fields in them."""
+    outer = {section.name.partition(".")[0] for section in SECTIONS}
+    table.check_keys(sorted(outer))
+    for name, inner in table.tables():
+        allowed = [s.name.partition(".")[2] for s in SECTIONS if s.name.startswith(f"{name}.")]
+        if allowed:
+            inner.check_keys(allowed)
+
+
+def _read_section(table: Table, section: Section) -> dict[str, Any]:
+    for part in section.name.split("."):
+        table = table.table(part)
+    table.check_keys([field.name for field in section.fields])
+    values: dict[str, Any] = {}
+    for field in section.fields:
+        if isinstance(field.default, str):
+            values[field.name] = table.text(field.name, field.default)
+        elif section.optional and field.name not in table:
+            values[field.name] = None
+        else:
+            values[field.name] = table.number(field.name, field.default, field.least, field.largest)
+    return values
+
+
+def _set_chassis(spec: mujoco.MjSpec, car: Car) -> None:
+    chassis, imu, geometry = car["chassis"], car["imu"], car["geometry"]
+    body = spec.body("chassis")
+    stretch = np.array(
+        [
+            geometry["wheelbase"] / 2.9,  # of models/suv.xml, as the drawn body is
+            0.5 * (geometry["track_front"] + geometry["track_rear"]) / 1.65,
+            1.0,
+        ]
+    )
+    for geom in body.geoms:
+        drawn = geom.pos + np.array([-1.25, 0.0, 0.644])  # from the front axle on the road
+        geom.pos = drawn * stretch - _imu(car)
+        geom.size = geom.size * stretch
+    body.pos = [0.0, 0.0, imu["height"]]
+    body.mass = chassis["mass"]
+    body.ipos = np.array(
+        [-chassis["cm_to_front_axle"], chassis["cm_left"], chassis["cm_height"]]
+    ) - _imu(car)
+    body.fullinertia = [chassis[name] for name in ("Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz")]
+
+
+def _imu(car: Car) -> np.ndarray:
+    """Where the chassis frame stands, from the road below the front axle's middle (3,) [m]."""
+    imu = car["imu"]
+    return np.array([-imu["to_front_axle"], imu["left"], imu["height"]])
+
+
+def _set_axle(spec: mujoco.MjSpec, car: Car, axle: str, radius: float) -> None:
+    rates, geometry, chassis = car[f"suspension.{axle}"], car["geometry"], car["chassis"]
+    half_track = 0.5 * geometry[f"track_{axle}"]
+    front_share = 1.0 - chassis["cm_to_front_axle"] / geometry["wheelbase"]
+    share = front_share if axle == "front" else 1.0 - front_share
+    sprung = 0.5 * share * chassis["mass"] * GRAVITY
+    for side, wheel in ((1.0, f"{axle[0]}l"), (-1.0, f"{axle[0]}r")):
+        hub, rim = spec.body(f"hub_{wheel}"), spec.body(f"wheel_{wheel}")
+        x = 0.0 if axle == "front" else -geometry["wheelbase"]
+        hub.pos = np.array([x, side * half_track, geometry["wheel_centre_height"]]) - _imu(car)
+        # hubs and rims as compact as the SUV's
+        hub.mass, hub.inertia = rates["hub_mass"], np.full(3, 0.3 / 25.0 * rates["hub_mass"])
+        rim.mass = rates["wheel_mass"]
+        rim.inertia = rates["wheel_inertia"] * np.array([1.0 / 1.7, 1.0, 1.0 / 1.7])
+        for geom in rim.geoms:
+            geom.size = geom.size * radius / 0.369  # the drawn SUV's
+        joint = spec.joint(f"travel_{wheel}")
+        lean = rates["roll_centre_height"] / half_track
+        joint.axis = [rates["travel_slope"], side * lean, 1.0]
+        joint.stiffness = _linear(rates["stiffness"])
+        joint.damping = _linear(rates["damping"])
+        joint.springref = -sprung / rates["stiffness"]
+        stop = spec.tendon(f"bump_stop_{wheel}")
+        stop.stiffness = _linear(rates["bump_stop"])
+        stop.springlength = [-rates["free_travel"], rates["free_travel"]]
+    spec.tendon(f"anti_roll_{axle}").stiffness = _linear(rates["anti_roll"])
+
+
+def _linear(rate: float) -> list[float]:
+    """Coefficients of MuJoCo's polynomial of a spring or damper."""
+    return [rate, 0.0, 0.0]
+
+
+def _tyre(path: Path, car: Car, axle: str) -> np.void:
+    """A tyre's file with what the car's file says of it."""
+    given = car[f"tyre.{axle}"]
+    tyre = np.array(read_tyre(tyre_path(path, str(given["file"]))))
+    figures = {key: value for key, value in given.items() if key != "file" and value is not None}
+    _scale(tyre, **figures)
+    return tyre[()]  # pyright: ignore[reportReturnType]
+
+
+def _scale(
+    tyre: np.ndarray,
+    nominal_load: float | None = None,
+    friction: float | None = None,
+    load_sensitivity: float | None = None,
+    cornering_coefficient: float | None = None,
+    relaxation_length: float | None = None,
+    radius: float | None = None,
+    vertical_stiffness: float | None = None,
+) -> None:
+    """Changes a tyre in place so that it has these figures."""
+    if nominal_load is not None:
+        for key in ("fzmin", "fzmax"):
+            tyre[key] *= nominal_load / tyre["fnomin"]
+        tyre["fnomin"] = nominal_load
+    if radius is not None:
+        tyre["unloaded_radius"] = radius
+    if vertical_stiffness is not None:
+        tyre["vertical_stiffness"] = vertical_stiffness
+    if load_sensitivity is not None:
+        change = load_sensitivity + tyre["pdy2"] / tyre["pdy1"]
+        for direction in "xy":
+            tyre[f"pd{direction}2"] -= change * tyre[f"pd{direction}1"]
+    load = float(tyre["fnomin"] * tyre["lfzo"])
+    if friction is not None:
+        factor = friction / (tyre["pdy1"] * tyre["lmuy"])
+        tyre["lmux"] *= factor
+        tyre["lmuy"] *= factor
+    if cornering_coefficient is not None:
+        tyre["lky"] *= cornering_coefficient * load / slip_stiffnesses(tyre[()], load, 0.0)[1]
+    if relaxation_length is not None:
+        tyre["lsgal"] *= relaxation_length / relaxation_lengths(tyre[()], load, 0.0)[1]

@@ -1,0 +1,210 @@
+"""A vehicle: an MJCF or TOML file with its steering, aerodynamics, tyres and loads, checked."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import models
+from twin.car.load import PointMass, RigidBody
+from twin.car.mjcf import read_mjcf, tyre_path
+from twin.car.toml_car import car_spec, car_tyres
+from twin.channels import WHEELS
+from twin.errors import TwinError
+from twin.scales import LARGEST_SCALE, LEAST_SCALE, VEHICLE_SCALES, scale_model, scale_tyres
+from twin.tyre.tir import read_tyre
+
+# Numbers of <custom> that every car needs, with the least that is allowed
+NUMBERS = {
+    "steering_ratio": 1e-3,
+    "ackermann": 0.0,
+    "drag_area": 0.0,  # c_D A [m2]
+    "lift_area_front": -10.0,  # -c_L A of each axle [m2], positive pushes down
+    "lift_area_rear": -10.0,
+}
+SENSOR_KINDS = {
+    "acceleration": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+    "rates": mujoco.mjtSensor.mjSENS_GYRO,
+    **{f"wheel_speed_{w}": mujoco.mjtSensor.mjSENS_JOINTVEL for w in WHEELS},
+}
+SENSORS = tuple(SENSOR_KINDS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """A car by its files, and what it carries. It can be pickled; a `Twin` of it cannot.
+
+    Attributes:
+        source: the MJCF file, or the TOML file of `twin.car.fields`.
+        loads: point masses fixed to the chassis as bodies of their own.
+        scales: what differs from the files by a factor, see `scaled`.
+    """
+
+    source: Path
+    loads: tuple[PointMass, ...] = ()
+    scales: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def load(cls, name: str | Path) -> "Vehicle":
+        """A car of the project by its name ("suv"), or of any MJCF or TOML file by its path.
+
+        Raises:
+            TwinError: no such file, or one that does not describe a car; the message says why.
+        """
+        vehicle = cls(source=models.path(str(name)))
+        vehicle.compile()
+        return vehicle
+
+    def with_loads(self, loads: Iterable[PointMass]) -> "Vehicle":
+        """The same car with more point masses on board, positions in the chassis frame."""
+        return replace(self, loads=(*self.loads, *loads))
+
+    def scaled(self, **factors: float) -> "Vehicle":
+        """The same car but for factors of `twin.scales.VEHICLE_SCALES`, as in `spring=1.1`.
+
+        Raises:
+            TwinError: a name is unknown or a factor out of range.
+        """
+        for name, factor in factors.items():
+            if name not in VEHICLE_SCALES:
+                raise TwinError(
+                    f"{self.source}: scale {name!r} is unknown; allowed: "
+                    f"{', '.join(VEHICLE_SCALES)}"
+                )
+            if not LEAST_SCALE <= factor <= LARGEST_SCALE:
+                raise TwinError(
+                    f"{self.source}: scale {name} is {factor}; allowed: {LEAST_SCALE} to "
+                    f"{LARGEST_SCALE}"
+                )
+        before = dict(self.scales)
+        merged = before | {name: before.get(name, 1.0) * f for name, f in factors.items()}
+        return replace(self, scales=tuple(merged.items()))
+
+    def spec(self) -> mujoco.MjSpec:
+        """The car as an editable MJCF, loads attached.
+
+        Raises:
+            TwinError: the file is missing or broken.
+        """
+        if not self.source.is_file():
+            raise TwinError(
+                f"{self.source}: no such vehicle file; give an MJCF or TOML file or a car's name"
+            )
+        is_toml = self.source.suffix == ".toml"
+        spec = car_spec(self.source) if is_toml else read_mjcf(self.source)
+        for load in self.loads:
+            body = spec.body("chassis").add_body(name=load.name, pos=load.position)
+            body.ipos = np.zeros(3)
+            body.mass = load.mass
+            body.inertia = np.full(3, 1e-9)
+            body.explicitinertial = True
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                size=[0.5 * (3.0 * load.mass / (4.0 * np.pi * 1000.0)) ** (1 / 3), 0, 0],
+                rgba=[0.85, 0.45, 0.1, 1.0],
+                mass=0.0,
+                contype=0,
+                conaffinity=0,
+            )
+        return spec
+
+    def compile(self) -> mujoco.MjModel:
+        """The model, checked so that nothing in compiled code can meet a missing part.
+
+        Raises:
+            TwinError: something a car needs is missing or out of range.
+        """
+        try:
+            model = self.spec().compile()
+        except (ValueError, mujoco.FatalError) as error:
+            raise TwinError(f"{self.source}: {' '.join(str(error).split())}") from None
+        self._check(model)
+        scale_model(model, dict(self.scales))
+        return model
+
+    def _check(self, model: mujoco.MjModel) -> None:
+        kinds = {
+            "body": (mujoco.mjtObj.mjOBJ_BODY, ("chassis", *(f"wheel_{w}" for w in WHEELS))),
+            "joint": (
+                mujoco.mjtObj.mjOBJ_JOINT,
+                ("chassis", *(f"{j}_{w}" for w in WHEELS for j in ("travel", "spin"))),
+            ),
+            "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, SENSORS),
+            "site": (mujoco.mjtObj.mjOBJ_SITE, ("imu",)),
+            "numeric": (mujoco.mjtObj.mjOBJ_NUMERIC, tuple(NUMBERS)),
+            "text": (mujoco.mjtObj.mjOBJ_TEXT, ("tyre_front", "tyre_rear")),
+        }
+        for kind, (code, names) in kinds.items():
+            for name in names:
+                if mujoco.mj_name2id(model, code, name) < 0:
+                    raise TwinError(f"{self.source}: has no {kind} named {name!r}; a car needs one")
+        for name, kind in SENSOR_KINDS.items():
+            if model.sensor(name).type[0] != kind:
+                wanted = kind.name.removeprefix("mjSENS_").lower()
+                raise TwinError(f"{self.source}: sensor {name} must be of the kind {wanted}")
+        if model.site("imu").pos.any():
+            raise TwinError(f"{self.source}: site imu must stand at the origin of the chassis")
+        if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET:
+            raise TwinError(f"{self.source}: option flag autoreset must be disable")
+        if (model.nq, model.nv) != (15, 14) or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
+            raise TwinError(
+                f"{self.source}: has {model.nv} degrees of freedom; a car has 14: chassis on a "
+                "free joint that comes first, four travels, four spins"
+            )
+        if model.opt.integrator not in (
+            mujoco.mjtIntegrator.mjINT_EULER,
+            mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+        ):
+            raise TwinError(f"{self.source}: option integrator must be Euler or implicitfast")
+        for name, least in NUMBERS.items():
+            value = model.numeric(name).data[0]
+            if not least <= value < np.inf:
+                raise TwinError(
+                    f"{self.source}: numeric {name} is {value}; allowed: at least {least}"
+                )
+
+    def tyres(self) -> np.ndarray:
+        """Coefficients of the four tyres, (4,) records; .tir files beside the MJCF come first.
+
+        Raises:
+            TwinError: a .tir file is missing or broken.
+        """
+        if self.source.suffix == ".toml":
+            read = car_tyres(self.source)
+        else:
+            texts = _texts(self.compile(), "tyre_front", "tyre_rear")
+            read = [read_tyre(tyre_path(self.source, name)) for name in texts]
+        tyres = np.array([read[0], read[0], read[1], read[1]], dtype=read[0].dtype)
+        scale_tyres(tyres, dict(self.scales))
+        return tyres
+
+    def chassis(self) -> RigidBody:
+        """Mass, CM and inertia of the chassis and all that is fixed to it, in the chassis frame."""
+        model = self.compile()
+        chassis = model.body("chassis").id
+        welded = np.flatnonzero(model.body_weldid == chassis)
+        data = mujoco.MjData(model)
+        data.qpos[3:7] = 1.0, 0.0, 0.0, 0.0
+        mujoco.mj_kinematics(model, data)
+        origin = data.xpos[chassis]
+        masses = model.body_mass[welded]
+        places = data.xipos[welded] - origin
+        cm = masses @ places / masses.sum()
+        inertia = np.zeros((3, 3))
+        for body, mass, place in zip(welded, masses, places - cm, strict=True):
+            axes = data.ximat[body].reshape(3, 3)
+            inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
+            inertia += mass * (place @ place * np.eye(3) - np.outer(place, place))
+        return RigidBody(mass=float(masses.sum()), cm=cm, inertia=inertia)
+
+
+def _texts(model: mujoco.MjModel, *names: str) -> list[str]:
+    """Texts of <custom> by their names."""
+    texts = []
+    for name in names:
+        text = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, name)
+        start = model.text_adr[text]
+        texts.append(model.text_data[start : start + model.text_size[text] - 1].decode())
+    return texts

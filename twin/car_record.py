@@ -1,0 +1,88 @@
+"""What compiled code sees of a car, in one record: addresses, ids, constants and tyre states."""
+
+import numpy as np
+from numba import from_dtype
+
+from twin.channels import OUTPUTS, PARAMETERS, TYRE_OUTPUTS, WHEELS
+from twin.tyre.tir import TYRE_DTYPE
+
+# Arrays of MjData (state, kinematics, sensors) and MjModel (inertia, steering), by MuJoCo's names;
+# the record holds their addresses.
+DATA_VIEWS = (
+    *("qpos", "qvel", "xpos", "xmat", "xaxis", "cvel", "subtree_com"),
+    *("qfrc_applied", "sensordata"),
+)
+MODEL_VIEWS = (
+    *("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_subtreemass", "body_quat"),
+    *("jnt_stiffness", "qpos_spring", "tendon_stiffness", "dof_damping"),
+)
+AXLES = ("front", "rear")
+_PER_WHEEL = (len(WHEELS),)
+# Scaling factors of a tyre that parameters change: friction, cornering stiffness, relaxation
+SCALED_TYRE = ("lmux", "lmuy", "lky", "lsgkp", "lsgal")
+
+CAR_DTYPE = np.dtype(
+    [
+        *((name, np.int64) for name in ("model", "data", *DATA_VIEWS, *MODEL_VIEWS)),
+        # where things are, ids of MuJoCo
+        ("chassis", np.int64),
+        ("wheel", np.int64, _PER_WHEEL),  # 0 to 3
+        ("wheel_body", np.int64, _PER_WHEEL),
+        ("travel_joint", np.int64, _PER_WHEEL),
+        ("travel_qpos", np.int64, _PER_WHEEL),
+        ("travel_dof", np.int64, _PER_WHEEL),
+        ("spin_qpos", np.int64, _PER_WHEEL),
+        ("spin_dof", np.int64, _PER_WHEEL),
+        ("sensor", np.int64, (len(OUTPUTS),)),  # address of each output
+        # constants
+        ("dt", np.float64),  # step [s]
+        ("wheelbase", np.float64),  # [m]
+        ("track", np.float64),  # [m]
+        ("steering_ratio", np.float64),
+        ("ackermann", np.float64),
+        ("drag_area", np.float64),  # [m2], in force
+        ("torque_share", np.float64, (2,)),  # of drive and brake torque, what reaches the wheels
+        ("lift_area", np.float64, (len(AXLES),)),  # [m2], positive pushes down
+        ("axle", np.float64, (len(AXLES),)),  # x of its hubs in the chassis frame [m]
+        ("spin_inertia", np.float64, _PER_WHEEL),  # of each wheel about its axis [kg m2]
+        ("nominal", np.float64, (len(PARAMETERS),)),  # the unloaded chassis; 1 for a scale
+        ("bar", np.int64, (len(AXLES),)),  # tendon of each anti-roll bar; -1: none
+        # of each wheel what `twin.scales` scales, as the files have it
+        ("nominal_tyre", np.float64, (len(SCALED_TYRE), *_PER_WHEEL)),
+        ("nominal_drag_area", np.float64),
+        ("nominal_torque_share", np.float64, (2,)),
+        ("nominal_stiffness", np.float64, _PER_WHEEL),  # [N/m]
+        ("nominal_spring", np.float64, _PER_WHEEL),  # free position [m]
+        ("nominal_bar", np.float64, (len(AXLES),)),  # [N/m]
+        ("nominal_damping", np.float64, _PER_WHEEL),  # [N s/m]
+        ("compiled_inertia", np.float64, (7,)),  # principal moments, and their axes' quaternion
+        ("other_mass", np.float64, (2,)),  # of the world's and the chassis' trees, without chassis
+        ("side", np.float64, _PER_WHEEL),  # 1 for a tyre as measured, -1 for a mirrored one
+        (
+            "tyres",
+            np.float64,
+            (len(TYRE_DTYPE.names or ()), *_PER_WHEEL),
+        ),  # see `twin.tyre.four_tyres`
+        # ours, not MuJoCo's
+        ("tyre_state", np.float64, (*_PER_WHEEL, 3)),  # see `twin.tyre.contact`
+        ("tyre_output", np.float64, (*_PER_WHEEL, len(TYRE_OUTPUTS))),
+        ("parameters", np.float64, (len(PARAMETERS),)),  # deltas in force
+        # room to find the principal axes of the chassis
+        ("tensor", np.float64, (3, 3)),
+        ("vectors", np.float64, (3, 3)),
+        ("moments", np.float64, (3,)),
+    ],
+    align=True,
+)
+"""A simulated car as `twin.kernel` sees it; the `Twin` that made it owns what it points to."""
+
+Car = np.record
+CAR = from_dtype(CAR_DTYPE)  # its type in compiled code
+
+
+def new_car(**fields: object) -> Car:
+    """A car of these fields, the others zero."""
+    car = np.zeros(1, np.dtype((np.record, CAR_DTYPE)))
+    for name, value in fields.items():
+        car[name] = value
+    return car[0]

@@ -1,0 +1,1 @@
+"""CommonRoad's multi-body car: another simulator in the twin's place."""

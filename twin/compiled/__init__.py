@@ -1,0 +1,1 @@
+"""What compiled code is made of: SIMD, elementary functions, MuJoCo's library, call boundaries."""

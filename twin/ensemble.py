@@ -1,0 +1,39 @@
+"""Several twins of one vehicle side by side, for observers that compare them."""
+
+import numpy as np
+
+from twin.car.vehicle import Vehicle
+from twin.car_record import CAR_DTYPE
+from twin.errors import TwinError
+from twin.twin import Twin
+
+
+class Fleet:
+    """Twins of one vehicle whose cars lie in one array, so that one compiled loop steps them all.
+
+    Attributes:
+        vehicle: what each simulates.
+        twins: the owners of what `cars` points to.
+        cars: (n,) records, `cars[i]` the same car as `twins[i].car`; valid as long as this object
+            lives.
+
+    Raises:
+        TwinError: fewer than one twin.
+    """
+
+    def __init__(self, vehicle: Vehicle, size: int) -> None:
+        if size < 1:
+            raise TwinError(f"fleet: size is {size}; allowed: at least 1")
+        self.vehicle = vehicle
+        self.twins = tuple(Twin(vehicle) for _ in range(size))
+        self.cars = np.recarray(size, dtype=CAR_DTYPE)
+        for i, twin in enumerate(self.twins):
+            self.cars[i] = twin.car
+            twin.car = self.cars[i]
+
+    def __len__(self) -> int:
+        """Number of twins."""
+        return len(self.twins)
+
+    def __reduce__(self) -> str:
+        raise TwinError("a Fleet owns memory of MuJoCo and cannot be pickled; send its Vehicle")

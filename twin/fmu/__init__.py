@@ -1,0 +1,1 @@
+"""Co-simulation FMUs in the twin's place."""

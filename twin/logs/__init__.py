@@ -1,0 +1,1 @@
+"""Drives and recorded logs: file formats, maps, units."""

@@ -1,0 +1,25 @@
+"""The file formats of logs and drives, by the ending of the file's name."""
+
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from twin.errors import TwinError
+
+FORMATS = {
+    ".parquet": "twin.logs.parquet",
+    ".csv": "twin.logs.csv",
+    ".mf4": "twin.logs.mdf",
+}
+
+
+def format_of(path: str | Path) -> ModuleType:
+    """The module that reads and writes files like this one.
+
+    Raises:
+        TwinError: the name ends in nothing we know.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in FORMATS:
+        raise TwinError(f"{path}: name ends in {ending!r}; allowed: {', '.join(FORMATS)}")
+    return import_module(FORMATS[ending])

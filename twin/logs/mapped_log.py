@@ -1,0 +1,201 @@
+"""A log of anybody becomes a `Drive` by its map, and says what was done to it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from twin.channels import FURTHER_OUTPUTS, OUTPUTS, WHEELS
+from twin.errors import TwinError
+from twin.logs.drive import Drive
+from twin.logs.formats import format_of
+from twin.logs.map import TORQUES, LogMap, Source, unit_in_si
+from twin.logs.raw_log import Array, Channel, RawLog, check_size, listed
+from twin.logs.resampling import FASTER, gaps, resample
+from twin.logs.units import our_unit
+
+_SPEED = "vx or the wheel speeds"
+# What an estimate needs at least; a constant input tells nothing. Chosen after what the laws of
+# the studies compare, and what moves it.
+NEEDS = {
+    "mass": ("ax", *TORQUES),
+    "Jxx": ("roll_rate", "steering_wheel_angle"),
+    "Jyy": ("pitch_rate",),
+    "Jzz": ("yaw_rate", "steering_wheel_angle"),
+    "tyre_friction": ("ay", "yaw_rate", "steering_wheel_angle", _SPEED),
+    "cornering_stiffness": ("ay", "yaw_rate", "steering_wheel_angle", _SPEED),
+    "sideslip": ("ay", "yaw_rate", "steering_wheel_angle", _SPEED),
+}
+
+
+def load_drive(path: str | Path, map_path: str | Path) -> Drive:
+    """A log as a drive.
+
+    Inputs are those of `twin.INPUTS`, less the torques where the twin is to follow the speed.
+    Measurements are `twin.OUTPUTS`, NaN where the log has none, and behind them what it has of
+    `twin.FURTHER_OUTPUTS`. `settings["log"]` holds the file, the map, whether to follow the speed,
+    the inputs that the map declares constant and, under "done", sentences that say what was done
+    and what cannot be estimated.
+
+    Args:
+        path: CSV, Parquet or MDF 4.
+        map_path: see `twin.logs.map`.
+
+    Raises:
+        TwinError: the log or the map is missing or broken, they do not fit, or an input has gaps.
+    """
+    log_map = LogMap.load(map_path)
+    log = format_of(path).read_log(Path(path), (log_map.time_name, log_map.time_unit))
+    return drive_of(log, log_map)
+
+
+def drive_of(log: RawLog, log_map: LogMap) -> Drive:
+    """The drive of a log that was read; see `load_drive`."""
+    ours = {name: _in_si(log, log_map, name, s) for name, s in log_map.channels.items()}
+    truth = {name: _in_si(log, log_map, name, s) for name, s in log_map.truth.items()}
+    grid = _grid(log, log_map, ours)
+    done = [*log.notes, *_about_time(grid, log_map)]
+    columns = {}
+    for name, channel in ours.items():
+        columns[name] = resample(channel.time, channel.values, grid, log_map.longest_gap)
+        done.append(_about_channel(name, log_map, channel, columns[name]))
+    kept = {
+        name: resample(channel.time, channel.values, grid, log_map.longest_gap)
+        for name, channel in truth.items()
+    }
+    done += [f"{name}: truth, from {log_map.truth[name].name!r}." for name in truth]
+    for name, value in log_map.constants.items():
+        columns[name] = np.full(grid.size, value)
+        done.append(f"{name}: {value:g} {our_unit(name)} throughout, as the map declares.")
+    if log_map.follow_speed:
+        done.append("The log has no torques: the twin is to follow the measured vx.")
+    for name in log_map.input_names:
+        _check_input(log, log_map, name, grid, columns[name])
+    names = (*OUTPUTS, *(name for name in FURTHER_OUTPUTS if name in columns))
+    missing = np.full(grid.size, np.nan)
+    done += _about_missing(columns)
+    done += _about_estimates(columns, log_map)
+    return Drive(
+        time=grid,
+        inputs=np.column_stack([columns[name] for name in log_map.input_names]),
+        input_names=log_map.input_names,
+        measurements=np.column_stack([columns.get(name, missing) for name in names]),
+        output_names=names,
+        truth=kept,
+        settings={
+            "log": {
+                "file": log.path.name,
+                "map": log_map.path.name,
+                "follow_speed": log_map.follow_speed,
+                "constants": list(log_map.constants),
+                "done": done,
+            }
+        },
+    )
+
+
+def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
+    """A channel of the log in our unit, sign and time."""
+    if source.name not in log.channels:
+        if source.name in log.text:
+            has = f"is no number there but {log.text[source.name]}"
+        else:
+            has = f"is not there; it has {listed(log.channels)}"
+        raise TwinError(f"{log.path}: channel {source.name[:40]!r}, mapped to {name}, {has}")
+    channel = log.channels[source.name]
+    unit = source.unit or channel.unit
+    if not unit:
+        raise TwinError(
+            f"{log_map.path}: channels.{name}.unit is missing and {log.path} gives none; allowed: "
+            "name it"
+        )
+    try:
+        scale = unit_in_si(name, unit, source.radius)
+    except TwinError as error:
+        raise TwinError(f"{log_map.path}: channels.{name}.unit {error}") from None
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = source.sign * scale * source.factor * (channel.values - source.offset)
+    return Channel(time=channel.time - source.delay, values=values, unit=unit)
+
+
+def _grid(log: RawLog, log_map: LogMap, ours: Mapping[str, Channel]) -> Array:
+    """Sample times over which there are all inputs, or anything at all if all are declared."""
+    inputs = [channel.time for name, channel in ours.items() if name in log_map.input_names]
+    times = inputs or [channel.time for channel in ours.values()]
+    if not times:
+        raise TwinError(f"{log_map.path}: channels is empty; allowed: map at least one")
+    starts, ends = [t[0] for t in times], [t[-1] for t in times]
+    start, end = (max(starts), min(ends)) if inputs else (min(starts), max(ends))
+    steps = np.floor((end - start) * log_map.rate + 1e-3)
+    if steps < 1.0:
+        raise TwinError(
+            f"{log.path}: all inputs are there from {start:g} to {end:g} s only; allowed: at least "
+            f"two samples at {log_map.rate:g} Hz"
+        )
+    columns = len(OUTPUTS) + len(log_map.channels) + len(log_map.truth) + len(log_map.constants)
+    check_size(log.path, int(min(steps, 1e18)) * columns, f"makes at {log_map.rate:g} Hz")
+    return start + np.arange(int(steps) + 1) / log_map.rate
+
+
+def _check_input(log: RawLog, log_map: LogMap, name: str, grid: Array, values: Array) -> None:
+    missing = ~np.isfinite(values)
+    if missing.any():
+        first = grid[int(np.argmax(missing))]
+        raise TwinError(
+            f"{log.path}: input {name} has a gap of {missing.sum() / log_map.rate:.3g} s in all, "
+            f"first at {first:.6g} s; allowed: {log_map.longest_gap:g} s each (longest_gap)"
+        )
+
+
+def _about_time(grid: Array, log_map: LogMap) -> list[str]:
+    return [
+        f"The drive lasts from {grid[0]:.6g} to {grid[-1]:.6g} s: {grid.size} samples at "
+        f"{log_map.rate:g} Hz, linear between those of the log."
+    ]
+
+
+def _about_channel(name: str, log_map: LogMap, channel: Channel, values: Array) -> str:
+    source = log_map.channels[name]
+    rate = (channel.time.size - 1) / max(channel.time[-1] - channel.time[0], 1e-12)
+    parts = [f"{name}: from {source.name!r} in {channel.unit} at {rate:.4g} Hz"]
+    if source.sign < 0.0:
+        parts.append("sign turned")
+    if source.factor != 1.0:
+        parts.append(f"times {source.factor:g}")
+    if source.offset:
+        parts.append(f"less {source.offset:g}")
+    if source.radius:
+        parts.append(f"over a radius of {source.radius:g} m")
+    if source.delay:
+        parts.append(f"brought forward by {source.delay:g} s")
+    if rate > FASTER * log_map.rate:
+        parts.append("averaged over each sample of the drive")
+    missing = int(np.count_nonzero(np.isnan(values)))
+    if missing:
+        parts.append(f"{missing} samples missing in {len(gaps(channel.time))} gaps and at the ends")
+    return ", ".join(parts) + "."
+
+
+def _about_missing(columns: Mapping[str, Array]) -> list[str]:
+    missing = [name for name in OUTPUTS if name not in columns]
+    return [f"Not in the log, hence NaN: {', '.join(missing)}."] if missing else []
+
+
+def _about_estimates(columns: Mapping[str, Array], log_map: LogMap) -> list[str]:
+    """What cannot be estimated, and which channel it wants."""
+    known = {name for name, values in columns.items() if np.isfinite(values).any()}
+    known -= set(log_map.constants)
+    if "vx" in known or all(name in known for name in OUTPUTS if name.startswith("wheel_speed")):
+        known.add(_SPEED)
+    sentences = []
+    for quantity, needed in NEEDS.items():
+        lacking = dict.fromkeys(_of_all_wheels(name) for name in needed if name not in known)
+        if lacking:
+            sentences.append(f"{quantity} cannot be estimated without {', '.join(lacking)}.")
+    return sentences
+
+
+def _of_all_wheels(name: str) -> str:
+    """The name of a wheel's channel as that of all four."""
+    stem, _, wheel = name.rpartition("_")
+    return f"{stem}_*" if wheel in WHEELS else name

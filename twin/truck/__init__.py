@@ -1,0 +1,1 @@
+"""The truck of KBF."""

@@ -1,0 +1,34 @@
+"""Functions that the Magic Formula is put together from, compiled; see `magic_formula`."""
+
+from twin.compiled.elementary import atan, exp
+from twin.compiled.simd import inlined, minimum, sqrt
+
+LEAST_SHARE = 0.05  # of a factor that the formula could drive to zero or beyond, chosen
+
+
+@inlined
+def bend(x, e):
+    """Returns the inner angle of the Magic Formula, its curvature E limited to 1. (4.E14)."""
+    return atan(x - minimum(e, 1.0) * (x - atan(x)))
+
+
+@inlined
+def cos_arctan(x):
+    """Returns cos(arctan(x))."""
+    return 1.0 / sqrt(1.0 + x * x)
+
+
+@inlined
+def sin_2_arctan(x):
+    """Returns sin(2 arctan(x))."""
+    return 2.0 * x / (1.0 + x * x)
+
+
+@inlined
+def power(x, exponent):
+    """Returns x^exponent for x from 0.001 to 1000, its logarithm by Halley's method."""
+    logarithm = 2.0 * (x - 1.0) / (x + 1.0)
+    for _ in range(6):
+        reached = exp(logarithm)
+        logarithm += 2.0 * (x - reached) / (x + reached)
+    return exp(exponent * logarithm)
