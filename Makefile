@@ -6,14 +6,14 @@ BIN := .venv/bin
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
 
-demo: .venv/demo.stamp .venv/numba.stamp  ## estimates the mass of a loaded car; the timeline goes to out/
+demo: .venv/demo.stamp  ## estimates the mass of a loaded car; the timeline goes to out/
 	mkdir -p out
 	$(BIN)/til run mass --rrd out/mass.rrd
 
-test: .venv/test.stamp .venv/numba.stamp  ## the tests, less those of minutes
+test: .venv/test.stamp  ## the tests, less those of minutes
 	$(BIN)/pytest -n 2
 
-test-slow: .venv/test.stamp .venv/numba.stamp  ## the tests of minutes
+test-slow: .venv/test.stamp  ## the tests of minutes
 	$(BIN)/pytest -n 2 -m slow
 
 check: .venv/check.stamp  ## lint, format, types
@@ -21,7 +21,7 @@ check: .venv/check.stamp  ## lint, format, types
 	$(BIN)/ruff format --check
 	$(BIN)/basedpyright
 
-bench: .venv/demo.stamp .venv/numba.stamp  ## speed, as ratios measured side by side
+bench: .venv/demo.stamp  ## speed, as ratios measured side by side
 	$(BIN)/til bench
 
 clean:  ## removes results and caches, not the virtual environment
@@ -38,9 +38,4 @@ clean:  ## removes results and caches, not the virtual environment
 .venv/check.stamp: extras = plots,test,check
 .venv/%.stamp: pyproject.toml | .venv/pyvenv.cfg
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[$(extras)]'
-	touch $@
-
-# numba compares a cached function with its own file only, not with those of what it calls.
-.venv/numba.stamp: $(shell find twin estimators scenarios -name '*.py') | .venv/pyvenv.cfg
-	find twin estimators scenarios -name '*.nb[ic]' -delete
 	touch $@
