@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from scenarios.cli import log_commands, study_commands
+from scenarios.cli import doctor, log_commands, study_commands
 from scenarios.cli.options import Mistake
 
 
@@ -56,12 +56,20 @@ class Program(click.Group):
             raise
 
 
-@click.group(cls=Program, no_args_is_help=False)
-def program() -> None:
+@click.group(
+    cls=Program,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+@click.version_option(package_name=doctor.PROJECT, message="%(prog)s %(version)s")
+@click.pass_context
+def program(context: click.Context) -> None:
     """Drives a car and its digital twin, and estimates what nobody measures."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
-for command in (*study_commands.COMMANDS, *log_commands.COMMANDS):
+for command in (*study_commands.COMMANDS, *log_commands.COMMANDS, doctor.doctor):
     program.add_command(command)
 
 if __name__ == "__main__":

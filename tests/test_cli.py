@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -200,7 +201,6 @@ def test_options_of_limits_reach_what_gives_them(til):
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("", "Missing command. (see til --help)"),
         ("drive", "No such command 'drive'. (see til --help)"),
         ("run", "Missing argument 'NAME'. (see til run --help)"),
         ("run lap", "no scenario 'lap', only fake"),
@@ -326,3 +326,14 @@ def test_inspect_shows_a_log_and_names_a_missing_one(til, tmp_path):
         "",
         "til: none.csv: cannot be read: No such file or directory\n",
     )
+
+
+def test_program_alone_prints_its_help(til):
+    status, out, err = til()
+    assert (status, err) == (0, "")
+    assert out == til("-h")[1]
+    assert "doctor" in out
+
+
+def test_version_is_that_of_the_package(til):
+    assert til("--version")[1] == f"til {metadata.version('twin-in-the-loop')}\n"
