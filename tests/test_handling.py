@@ -39,7 +39,7 @@ import models
 from scenarios.driving.manoeuvres import Manoeuvre
 from scenarios.driving.record import record
 from twin import STATES, TYRE_OUTPUTS, WHEELS, Twin, Vehicle
-from twin.tyre.magic_formula import effective_radius
+from twin.tyre.radius import effective_radius
 from twin.tyre.tir import read_tyre
 
 TYRE = read_tyre(models.path("tyres/suv.tir"))

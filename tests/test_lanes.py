@@ -7,7 +7,8 @@ from twin.compiled import simd as lanes
 from twin.compiled.simd import gather, load, scatter, unpack
 from twin.tyre.four_tyres import four_tyres, table_of
 from twin.tyre.magic_formula import magic_formula
-from twin.tyre.tir import TYRE_DTYPE, read_tyre
+from twin.tyre.record import TYRE_DTYPE
+from twin.tyre.tir import read_tyre
 
 A = np.array([1.5, -2.0, 0.25, -0.0])
 B = np.array([-3.0, -2.0, 7.0, 2.5])

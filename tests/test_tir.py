@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 import models
 from twin.errors import TwinError
-from twin.tyre.tir import LARGEST_FILE, REQUIRED, SCALING, TYRE_DTYPE, read_tyre
+from twin.tyre.record import TYRE_DTYPE
+from twin.tyre.tir import LARGEST_FILE, read_tyre
+from twin.tyre.tir_keys import REQUIRED, SCALING
 
 SUV = models.path("tyres/suv.tir").read_text()
 

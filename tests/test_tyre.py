@@ -5,13 +5,11 @@ from hypothesis import strategies as st
 from numba import njit
 
 import models
-from twin.tyre.magic_formula import (
-    effective_radius,
-    magic_formula,
-    relaxation_lengths,
-    slip_stiffnesses,
-)
-from twin.tyre.tir import ANY, LIMITS, REQUIRED, SCALING, TYRE_DTYPE, read_tyre
+from twin.tyre.magic_formula import magic_formula, relaxation_lengths, slip_stiffnesses
+from twin.tyre.radius import effective_radius
+from twin.tyre.record import TYRE_DTYPE
+from twin.tyre.tir import read_tyre
+from twin.tyre.tir_keys import ANY, LIMITS, REQUIRED, SCALING
 
 NOMINAL = 6000.0  # F_z0 of the SUV's tyre [N]
 RADIUS = 0.369  # R_0 of the SUV's tyre [m]

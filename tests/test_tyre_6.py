@@ -10,12 +10,8 @@ from hypothesis import strategies as st
 
 import models
 from twin import Twin, TwinError, Vehicle
-from twin.tyre.magic_formula import (
-    effective_radius,
-    magic_formula,
-    relaxation_lengths,
-    slip_stiffnesses,
-)
+from twin.tyre.magic_formula import magic_formula, relaxation_lengths, slip_stiffnesses
+from twin.tyre.radius import effective_radius
 from twin.tyre.tir import read_tyre
 from twin.tyre.tir_6 import EXTRA_SCALING, OPTIONAL, only_in_6, only_in_52
 

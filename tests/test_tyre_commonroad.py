@@ -13,7 +13,7 @@ from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 from vehiclemodels.utils import tire_model
 
 from twin.tyre.magic_formula import magic_formula
-from twin.tyre.tir import TYRE_DTYPE
+from twin.tyre.record import TYRE_DTYPE
 
 KAPPAS = (-1.0, -0.2, -0.04, 0.0, 0.01, 0.1, 0.7)
 ALPHAS = (-0.8, -0.1, -0.02, 0.0, 0.03, 0.15, 1.2)

@@ -4,7 +4,7 @@ import numpy as np
 from numba import from_dtype
 
 from twin.channels import OUTPUTS, PARAMETERS, TYRE_OUTPUTS, WHEELS
-from twin.tyre.tir import TYRE_DTYPE
+from twin.tyre.record import TYRE_DTYPE
 
 # Arrays of MjData (state, kinematics, sensors) and MjModel (inertia, steering), by MuJoCo's names;
 # the record holds their addresses.

@@ -49,7 +49,7 @@ _LMUX, _LMUY, _LKY, _LSGKP, _LSGAL = (NAMES.index(name) for name in SCALED_TYRE)
 
 
 def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
-    """Scales four records of `twin.tyre.tir.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
+    """Scales four `twin.tyre.record.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
     for axle, wheels in _TYRES.items():
         for name, keys in TYRE_SCALES.items():
             factor = np.ones(len(WHEELS))

@@ -25,7 +25,7 @@ from twin.errors import TwinError
 from twin.scales import TORQUES, bars
 from twin.tyre.contact import ROAD
 from twin.tyre.four_tyres import table_of
-from twin.tyre.magic_formula import effective_radius
+from twin.tyre.radius import effective_radius
 
 Array = NDArray[np.float64]
 SETTLING_STEPS = 20

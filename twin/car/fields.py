@@ -5,16 +5,7 @@ Defaults are the SUV of models/suv.xml: a car of which nothing else is known sta
 
 from typing import NamedTuple
 
-
-class Field(NamedTuple):
-    """One field: its unit, default, range and meaning."""
-
-    name: str
-    unit: str
-    default: float | str
-    least: float
-    largest: float
-    text: str
+from twin.toml_fields import Field
 
 
 class Section(NamedTuple):

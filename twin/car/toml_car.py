@@ -7,12 +7,13 @@ import mujoco
 import numpy as np
 
 import models
-from twin.car.fields import SECTIONS, Field, Section
+from twin.car.fields import SECTIONS, Section
 from twin.car.mjcf import tyre_path
 from twin.errors import TwinError
-from twin.toml_file import Table, read_toml, reason
-from twin.tyre.magic_formula import relaxation_lengths, slip_stiffnesses
-from twin.tyre.tir import read_tyre
+from twin.toml_fields import Field
+from twin.toml_file import Table, read_toml, reason, shown
+from twin.tyre.files import read_tyre_file
+from twin.tyre.interface import MAGIC_FORMULA, relaxation, stiffness
 
 GRAVITY = 9.81  # [m/s2], as in models/suv.xml
 
@@ -190,8 +191,13 @@ def _linear(rate: float) -> list[float]:
 def _tyre(path: Path, car: Car, axle: str) -> np.void:
     """A tyre's file with what the car's file says of it."""
     given = car[f"tyre.{axle}"]
-    tyre = np.array(read_tyre(tyre_path(path, str(given["file"]))))
+    tyre = np.array(read_tyre_file(tyre_path(path, str(given["file"]))))
     figures = {key: value for key, value in given.items() if key != "file" and value is not None}
+    if figures and tyre["model"] != MAGIC_FORMULA:
+        raise TwinError(
+            f"{path}: tyre.{axle}.{next(iter(figures))} does not apply to {shown(given['file'])}; "
+            "allowed: figures beside a .tir file only"
+        )
     _scale(tyre, **figures)
     return tyre[()]  # pyright: ignore[reportReturnType]
 
@@ -225,6 +231,6 @@ def _scale(
         tyre["lmux"] *= factor
         tyre["lmuy"] *= factor
     if cornering_coefficient is not None:
-        tyre["lky"] *= cornering_coefficient * load / slip_stiffnesses(tyre[()], load, 0.0)[1]
+        tyre["lky"] *= cornering_coefficient * load / stiffness(tyre[()], load, 0.0)[1]
     if relaxation_length is not None:
-        tyre["lsgal"] *= relaxation_length / relaxation_lengths(tyre[()], load, 0.0)[1]
+        tyre["lsgal"] *= relaxation_length / relaxation(tyre[()], load, 0.0)[1]

@@ -14,7 +14,7 @@ from twin.car.toml_car import car_spec, car_tyres
 from twin.channels import WHEELS
 from twin.errors import TwinError
 from twin.scales import LARGEST_SCALE, LEAST_SCALE, VEHICLE_SCALES, scale_model, scale_tyres
-from twin.tyre.tir import read_tyre
+from twin.tyre.files import read_tyre_file
 
 # Numbers of <custom> that every car needs, with the least that is allowed
 NUMBERS = {
@@ -175,7 +175,7 @@ class Vehicle:
             read = car_tyres(self.source)
         else:
             texts = _texts(self.compile(), "tyre_front", "tyre_rear")
-            read = [read_tyre(tyre_path(self.source, name)) for name in texts]
+            read = [read_tyre_file(tyre_path(self.source, name)) for name in texts]
         tyres = np.array([read[0], read[0], read[1], read[1]], dtype=read[0].dtype)
         scale_tyres(tyres, dict(self.scales))
         return tyres

@@ -1,8 +1,8 @@
 """One wheel on the road: contact geometry, transient slip and the wrench on the wheel.
 
 The contact frame stands at the contact point: x along the wheel's heading in the road plane, y to
-its left, z along the road's normal. Slips are signed as the Magic Formula of
-`twin.tyre.magic_formula` wants them: kappa = -v_sx / |v_x|, alpha = atan(v_sy / |v_x|).
+its left, z along the road's normal. Slips are signed as the tyre models of `twin.tyre.interface`
+expect: kappa = -v_sx / |v_x|, alpha = atan(v_sy / |v_x|).
 
 Slip builds up with the distance rolled (Pacejka, Tyre and Vehicle Dynamics, 2nd ed., Eqs. 7.7 and
 7.9): the state is the deflection of the carcass, u along and v across. Integrated exactly over a
@@ -15,12 +15,8 @@ from numba import njit
 
 from twin.compiled.elementary import asin, atan, clip, cos, exp
 from twin.compiled.simd import absolute, anywhere, inlined, maximum, sqrt, where
-from twin.tyre.magic_formula import (
-    effective_radius,
-    magic_formula,
-    relaxation_lengths,
-    slip_stiffnesses,
-)
+from twin.tyre.interface import forces, relaxation, stiffness
+from twin.tyre.radius import effective_radius
 
 # Below this speed [m/s] a rolling tyre no longer damps its own deflection (Pacejka Eq. 8.131).
 LOW_SPEED = 2.0
@@ -87,7 +83,7 @@ def wheel_contact(tyre, side, state, centre, axis, velocity, rate, normal, road,
     """The force and moment of the road on a wheel, or on four wheels at once.
 
     Args:
-        tyre: coefficients, see `twin.tyre.magic_formula`.
+        tyre: record, see `twin.tyre.record`.
         side: 1 for a tyre mounted as measured, -1 for a mirrored one.
         state: deflections along and across [m].
         centre: wheel centre in the world [m], 3-tuple like all that follow.
@@ -127,7 +123,7 @@ def wheel_contact(tyre, side, state, centre, axis, velocity, rate, normal, road,
         tyre, state, load, camber, forward_speed, slip_x, slip_y, dt
     )
     alpha = atan(tan_alpha)
-    fx, fy, mx, my, mz = magic_formula(tyre, load, kappa, alpha, camber, forward_speed, side)
+    fx, fy, mx, my, mz = forces(tyre, load, kappa, alpha, camber, forward_speed, side)
     # Without slip a tyre passes on all power: the torque of F_x has the arm that its speed has.
     my = my - fx * (rolling_radius - loaded_radius)
 
@@ -152,13 +148,13 @@ def transient_slip(tyre, state, load, camber, forward_speed, slip_x, slip_y, dt)
     A wheel without load has none of them.
     """
     speed = absolute(forward_speed)
-    sigma_x, sigma_y = relaxation_lengths(tyre, load, camber)
+    sigma_x, sigma_y = relaxation(tyre, load, camber)
     u = relax(state[LONGITUDINAL], -slip_x, speed, sigma_x, dt)
     v = relax(state[LATERAL], slip_y, speed, sigma_y, dt)
     kappa, tan_alpha = u / sigma_x, v / sigma_y
     slow = speed < LOW_SPEED
     if anywhere(slow):
-        stiffness_x, stiffness_y = slip_stiffnesses(tyre, load, camber)
+        stiffness_x, stiffness_y = stiffness(tyre, load, camber)
         give_x, give_y = load * sigma_x / stiffness_x, load * sigma_y / stiffness_y
         u_bounded = bounded(u, state[LONGITUDINAL], LARGEST_DEFLECTION * give_x)
         v_bounded = bounded(v, state[LATERAL], LARGEST_DEFLECTION * give_y)

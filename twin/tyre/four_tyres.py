@@ -8,13 +8,13 @@ from numba.extending import lower_getattr_generic, models, register_model
 from numpy.typing import NDArray
 
 from twin.compiled.simd import POINTER, UNALIGNED, VECTOR, built_in, four
-from twin.tyre.tir import TYRE_DTYPE
+from twin.tyre.record import TYRE_DTYPE
 
 NAMES = TYRE_DTYPE.names or ()
 
 
 class FourTyres(types.Type):
-    """A table (n, 4): a row per field of `twin.tyre.tir.TYRE_DTYPE`, a column per tyre."""
+    """A table (n, 4): a row per field of `twin.tyre.record.TYRE_DTYPE`, a column per tyre."""
 
     def __init__(self) -> None:
         super().__init__("FourTyres")

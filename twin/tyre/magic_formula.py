@@ -3,24 +3,20 @@
 Equation numbers are those of Pacejka, *Tyre and Vehicle Dynamics*, section 4.3.2, without turn
 slip: of the 2nd ed., where MF 5.2 has fewer coefficients than the book (stiffness and friction over
 camber) MF 5.2 counts; of the 3rd ed. for what is said of MF 6, see `twin.tyre.tir_6`. MF 5.2 has
-its
-further coefficients at 0; what differs beyond that is computed only if some tyre is of MF 6. Slip
-angle and inclination enter as such, not as tangent and sine (the book leaves the choice, 4.E3).
-Axes are ISO 8855, signs ISO-W: see `twin.tyre.tir`.
+its further coefficients at 0; what differs beyond that is computed only if some tyre is of MF 6.
+Slip angle and inclination enter as such, not as tangent and sine (the book leaves the choice,
+4.E3). Axes are ISO 8855, signs ISO-W: see `twin.tyre.tir`.
 
 Kept sane where the formula is extrapolated: outside its load range a tyre has the forces of the
 end of the range in proportion to the load; the inclination is limited to its range; curvatures
 are at most 1 (as the book asks), weights of combined slip not negative (likewise); friction,
 stiffnesses and relaxation lengths stay positive.
 
-A `tyre` is a record of `twin.tyre.tir.TYRE_DTYPE`, or `twin.compiled.simd.four_tyres` of an array
-of them; then the other numbers may be `Four`, too, and all four tyres are computed at once.
+A `tyre` is a record of `twin.tyre.record.TYRE_DTYPE`, or `twin.tyre.four_tyres.four_tyres` of a
+table of four; then the other numbers may be `Four`, too, and all four tyres are computed at once.
 """
 
 from math import pi
-from typing import Any
-
-from numba import njit
 
 from twin.compiled.elementary import atan, clip, cos, exp, sin
 from twin.compiled.simd import absolute, anywhere, copysign, inlined, maximum, where
@@ -31,16 +27,19 @@ from twin.tyre.moments import (
     rolling_resistance,
     trail,
 )
-from twin.tyre.shapes import LEAST_SHARE, bend, cos_arctan, sin_2_arctan
-
-Tyre = Any  # numpy.void, whose fields compiled code reads as attributes
+from twin.tyre.shapes import (
+    LEAST_SHARE,
+    Tyre,
+    bend,
+    compiled,
+    cos_arctan,
+    direction_of_travel,
+    sin_2_arctan,
+)
 
 LEAST_FRICTION = 0.01  # peak friction coefficient, chosen: below wet ice
 LEAST_RELAXATION = 0.02  # [m], chosen: a lightly loaded tyre answers at once, but not faster
 LARGEST_SLIP = 1e6  # longitudinal slip; the force is that of sliding long before
-ROLLING_SPEED = 0.1  # [m/s], chosen: below it rolling resistance and trail fade out
-
-compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @compiled
@@ -76,7 +75,7 @@ def magic_formula(
     kappa = clip(kappa, -LARGEST_SLIP, LARGEST_SLIP)
     alpha = clip(side * alpha, -0.5 * pi, 0.5 * pi)
     gamma = side * _inclination(tyre, gamma)
-    travel = _travel(vx)
+    travel = direction_of_travel(vx)
 
     kx = _slip_stiffness(tyre, fz, dfz)
     ky = _cornering_stiffness(tyre, fz, nominal, gamma)
@@ -163,23 +162,6 @@ def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, floa
     )
 
 
-@compiled
-def effective_radius(tyre: Tyre, fz: float) -> float:
-    """Returns the effective rolling radius R_e = v_x/omega of the free rolling wheel [m].
-
-    MF 5.2: R_e = R_0 - rho_0 (D_reff arctan(B_reff rho/rho_0) + F_reff rho/rho_0), with the
-    deflection rho = F_z/C_z, rho_0 at nominal load.
-
-    Args:
-        tyre: the tyre's record.
-        fz: wheel load [N].
-    """
-    deflection = clip(fz, 0.0, tyre.fzmax) / tyre.fnomin
-    loss = tyre.dreff * atan(tyre.breff * deflection) + tyre.freff * deflection
-    radius = tyre.unloaded_radius + tyre.growth - loss * tyre.fnomin / tyre.vertical_stiffness
-    return maximum(radius, 0.5 * tyre.unloaded_radius)
-
-
 @inlined
 def _pure_longitudinal(tyre, fz, dfz, kappa, gamma, kx):
     """Returns F_x0 [N], the longitudinal force without side slip. (4.E9)-(4.E18)."""
@@ -253,13 +235,6 @@ def _load(tyre, fz):
 @inlined
 def _inclination(tyre, gamma):
     return clip(gamma, -tyre.cammax, tyre.cammax)
-
-
-@inlined
-def _travel(vx):
-    """Returns the direction of travel, from -1 to 1, smooth about standstill."""
-    x = clip(vx / ROLLING_SPEED, -1.0, 1.0)
-    return 0.5 * x * (3.0 - x * x)
 
 
 @inlined

@@ -1,8 +1,17 @@
-"""Functions that the Magic Formula is put together from, compiled; see `magic_formula`."""
+"""Functions that tyre models are put together from, compiled."""
 
-from twin.compiled.elementary import atan, exp
+from typing import Any
+
+from numba import njit
+
+from twin.compiled.elementary import atan, clip, exp
 from twin.compiled.simd import inlined, minimum, sqrt
 
+Tyre = Any  # numpy.void, whose fields compiled code reads as attributes
+
+compiled = njit(cache=True, nogil=True, error_model="numpy")
+
+ROLLING_SPEED = 0.1  # [m/s], chosen: below it rolling resistance and trail fade out
 LEAST_SHARE = 0.05  # of a factor that the formula could drive to zero or beyond, chosen
 
 
@@ -32,3 +41,10 @@ def power(x, exponent):
         reached = exp(logarithm)
         logarithm += 2.0 * (x - reached) / (x + reached)
     return exp(exponent * logarithm)
+
+
+@inlined
+def direction_of_travel(vx):
+    """Returns the direction of travel, from -1 to 1, smooth about standstill."""
+    x = clip(vx / ROLLING_SPEED, -1.0, 1.0)
+    return 0.5 * x * (3.0 - x * x)

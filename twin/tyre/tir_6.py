@@ -44,8 +44,8 @@ _KEPT = _words(
     "LONGITUDINAL_STIFFNESS LATERAL_STIFFNESS PCFX1 PCFX2 PCFY1 PCFY2"
 )
 FIELDS = ("mf6", "growth", *(key.lower() for key in _KEPT))
-"""Fields of `twin.tyre.tir.TYRE_DTYPE` that are 0 in MF 5.2: mf6 is 1, growth [m] what is added to
-the rolling radius, the others are coefficients."""
+"""Fields of `twin.tyre.record.TYRE_DTYPE` that are 0 in MF 5.2: mf6 is 1, growth [m] what is added
+to the rolling radius, the others are coefficients."""
 
 
 def only_in_6() -> dict[str, tuple[str, ...]]:
