@@ -3,7 +3,7 @@ import pytest
 from cars import inputs, run, suv, times
 
 from twin import INPUTS, PARAMETERS, SCALES, STATES, Twin, TwinError, Vehicle
-from twin.scales import LARGEST_SCALE, LEAST_SCALE
+from twin.parameters import LARGEST_SCALE, LEAST_SCALE
 
 FACTORS = {
     "tyre_friction": 0.9,

@@ -3,7 +3,8 @@
 import numpy as np
 from numba import from_dtype
 
-from twin.channels import OUTPUTS, PARAMETERS, TYRE_OUTPUTS, WHEELS
+from twin.channels import OUTPUTS, TYRE_OUTPUTS, WHEELS
+from twin.parameters import PARAMETERS
 from twin.tyre.record import TYRE_DTYPE
 
 # Arrays of MjData (state, kinematics, sensors) and MjModel (inertia, steering), by MuJoCo's names;

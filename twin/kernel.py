@@ -11,11 +11,11 @@ from typing import Any
 from numba import njit, types
 
 from twin.car_record import CAR
-from twin.channels import FORCES
-from twin.parameters import set_load
+from twin.chassis import set_load
+from twin.parameters import AXLE_FORCES
 from twin.scales import set_scales
 from twin.states import copy_states, correct_states, states_are_sound
-from twin.stepping import FIRST_FORCE, step_car
+from twin.stepping import step_car
 
 _IN = types.Array(types.float64, 1, "C", readonly=True)  # read only: or writable
 _OUT = types.Array(types.float64, 1, "C")
@@ -70,15 +70,13 @@ def set_parameters(car, p):
 
     Args:
         car: the car.
-        p: (20,) deltas from the nominal car, `twin.channels.PARAMETERS`: mass [kg], CM [m], inertia
-            tensor about the new CM [kg m2], relative ones of tyres, drag, springs, dampers and
-            torques, and lateral forces on the axles [N].
-            On return it holds what was set: the mass has a floor, the tensor is one that a rigid
-            body can have, scales stay within `twin.scales`' bounds.
+        p: (np,) deltas from the nominal car, `twin.parameters.PARAMETERS`; the inertia tensor is
+            about the new CM. On return it holds what was set: the mass has a floor, the tensor is
+            one that a rigid body can have, scales stay within their bounds.
     """
     set_load(car, p.ctypes)
     set_scales(car, p.ctypes)
-    for i in range(FIRST_FORCE, FIRST_FORCE + len(FORCES)):
+    for i in range(AXLE_FORCES.start, AXLE_FORCES.stop):
         car.parameters[i] = p[i]
 
 

@@ -5,14 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.channels import OUTPUTS
+from twin.channels import CHANNEL, OUTPUTS
 from twin.errors import TwinError
 from twin.logs.drive import Drive
-
-# A channel that a drive does not excite is not noise-free: the least standard deviations.
-ACCELERATION_FLOOR = 0.05  # [m/s2]
-RATE_FLOOR = 0.003  # [rad/s]
-WHEEL_SPEED_SD = 0.05  # [rad/s], whatever the signal
 
 
 def noise_sd(
@@ -36,7 +31,12 @@ def noise_sd(
     """
     if not snr_db > -np.inf:
         raise TwinError(f"noise: snr_db is {snr_db}, must be a number of dB or inf")
-    floors = np.array([_floor(name) for name in names])
+    for name in names:
+        if name not in OUTPUTS:
+            raise TwinError(
+                f"noise: channel {name!r} has no noise model, only {', '.join(OUTPUTS)}"
+            )
+    floors = np.array([CHANNEL[name].noise_floor for name in names])
     if snr_db == np.inf:
         return np.zeros(len(names))
     valid = ~np.isnan(measurements)
@@ -44,8 +44,8 @@ def noise_sd(
     mean = np.where(valid, measurements, 0.0).sum(axis=0) / samples
     square = np.where(valid, measurements - mean, 0.0) ** 2
     sd = np.sqrt(square.sum(axis=0) / samples) * 10.0 ** (-snr_db / 20.0)
-    is_wheel_speed = np.array([name.startswith("wheel_speed_") for name in names], dtype=bool)
-    return np.where(is_wheel_speed, WHEEL_SPEED_SD, np.maximum(sd, floors))
+    by_snr = np.array([CHANNEL[name].noise_by_snr for name in names], dtype=bool)
+    return np.where(by_snr, np.maximum(sd, floors), floors)
 
 
 def with_noise(drive: Drive, snr_db: float, rng: np.random.Generator) -> Drive:
@@ -66,13 +66,3 @@ def with_noise(drive: Drive, snr_db: float, rng: np.random.Generator) -> Drive:
     return drive.replace(
         measurements=drive.measurements + noise, settings=drive.settings | noise_settings
     )
-
-
-def _floor(name: str) -> float:
-    if name not in OUTPUTS:
-        raise TwinError(f"noise: channel {name!r} has no noise model, only {', '.join(OUTPUTS)}")
-    if name in ("ax", "ay", "az"):
-        return ACCELERATION_FLOOR
-    if name.endswith("_rate"):
-        return RATE_FLOOR
-    return WHEEL_SPEED_SD

@@ -12,13 +12,12 @@ from numba import types
 from numpy.typing import NDArray
 
 from twin.car_record import AXLES, CAR, SCALED_TYRE
-from twin.channels import LOAD, SCALES, WHEELS
+from twin.channels import WHEELS
 from twin.compiled.boundary import VECTOR, behind
 from twin.compiled.simd import pointer
+from twin.parameters import LARGEST_SCALE, LEAST_SCALE, SCALE_FACTORS, SCALES, P
 from twin.tyre.four_tyres import NAMES
 
-# Beyond these factors it is no longer the same car
-LEAST_SCALE, LARGEST_SCALE = 0.3, 3.0
 # Coefficients of a .tir file behind each name; those after the first three are no parameters of
 # a running twin, but a real vehicle has others than its files say
 TYRE_SCALES = {
@@ -42,9 +41,6 @@ VEHICLE_SCALES = (
 TORQUES = ("drive_torque", "brake_torque")
 BARS = tuple(f"anti_roll_{axle}" for axle in AXLES)
 
-_FRICTION, _CORNERING, _DRAG, _SPRING, _DAMPER, _RELAXATION, _DRIVE, _BRAKE = range(
-    len(LOAD), len(LOAD) + len(SCALES)
-)
 _LMUX, _LMUY, _LKY, _LSGKP, _LSGAL = (NAMES.index(name) for name in SCALED_TYRE)
 
 
@@ -84,18 +80,18 @@ def set_scales(car, p):
     """The part of `twin.kernel.set_parameters` that is no load."""
     now = car.parameters
     changed = False
-    for i in range(_FRICTION, _BRAKE + 1):
+    for i in range(SCALE_FACTORS.start, SCALE_FACTORS.stop):
         p[i] = min(max(p[i], LEAST_SCALE - 1.0), LARGEST_SCALE - 1.0)
         changed = changed or p[i] != now[i]
         now[i] = p[i]
     if not changed:
         return
-    friction, cornering = 1.0 + p[_FRICTION], 1.0 + p[_CORNERING]
-    spring, damper = 1.0 + p[_SPRING], 1.0 + p[_DAMPER]
-    relaxation = 1.0 + p[_RELAXATION]
-    car.torque_share[0] = car.nominal_torque_share[0] * (1.0 + p[_DRIVE])
-    car.torque_share[1] = car.nominal_torque_share[1] * (1.0 + p[_BRAKE])
-    car.drag_area = car.nominal_drag_area * (1.0 + p[_DRAG])
+    friction, cornering = 1.0 + p[P.tyre_friction], 1.0 + p[P.cornering_stiffness]
+    spring, damper = 1.0 + p[P.spring], 1.0 + p[P.damper]
+    relaxation = 1.0 + p[P.relaxation]
+    car.torque_share[0] = car.nominal_torque_share[0] * (1.0 + p[P.drive_torque])
+    car.torque_share[1] = car.nominal_torque_share[1] * (1.0 + p[P.brake_torque])
+    car.drag_area = car.nominal_drag_area * (1.0 + p[P.drag])
     stiffness, free = pointer(car.jnt_stiffness), pointer(car.qpos_spring)
     damping, bar = pointer(car.dof_damping), pointer(car.tendon_stiffness)
     for w in range(len(WHEELS)):

@@ -5,6 +5,7 @@ import math
 from numba import types
 
 from twin.car_record import CAR
+from twin.channels import X
 from twin.compiled.boundary import VECTOR, behind
 from twin.compiled.simd import inlined, pointer
 from twin.tyre.contact import combine, cross
@@ -33,10 +34,10 @@ def correct_states(car, dx):
     qpos, qvel = pointer(car.qpos), pointer(car.qvel)
     w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
     vx, vy, vz = _unrotate((w, x, y, z), (qvel[0], qvel[1], qvel[2]))
-    angle = math.sqrt(dx[3] ** 2 + dx[4] ** 2 + dx[5] ** 2)
+    angle = math.sqrt(dx[X.roll] ** 2 + dx[X.pitch] ** 2 + dx[X.yaw] ** 2)
     if angle > 0.0:
         scale, c = math.sin(0.5 * angle) / angle, math.cos(0.5 * angle)
-        a, b, d = scale * dx[3], scale * dx[4], scale * dx[5]
+        a, b, d = scale * dx[X.roll], scale * dx[X.pitch], scale * dx[X.yaw]
         w, x, y, z = (
             w * c - x * a - y * b - z * d,
             w * a + x * c + y * d - z * b,
@@ -46,16 +47,16 @@ def correct_states(car, dx):
         norm = math.sqrt(w * w + x * x + y * y + z * z)
         w, x, y, z = w / norm, x / norm, y / norm, z / norm
         qpos[3], qpos[4], qpos[5], qpos[6] = w, x, y, z
-    velocity = _rotate((w, x, y, z), (vx + dx[14], vy + dx[15], vz + dx[16]))
+    velocity = _rotate((w, x, y, z), (vx + dx[X.vx], vy + dx[X.vy], vz + dx[X.vz]))
     for i in range(3):
-        qpos[i] += dx[i]
+        qpos[i] += dx[X.x + i]
         qvel[i] = velocity[i]
-        qvel[3 + i] += dx[17 + i]
+        qvel[3 + i] += dx[X.roll_rate + i]
     for i in range(4):
-        qpos[car.travel_qpos[i]] += dx[6 + i]
-        qpos[car.spin_qpos[i]] += dx[10 + i]
-        qvel[car.travel_dof[i]] += dx[20 + i]
-        qvel[car.spin_dof[i]] += dx[24 + i]
+        qpos[car.travel_qpos[i]] += dx[X.suspension_travel_fl + i]
+        qpos[car.spin_qpos[i]] += dx[X.wheel_angle_fl + i]
+        qvel[car.travel_dof[i]] += dx[X.suspension_rate_fl + i]
+        qvel[car.spin_dof[i]] += dx[X.wheel_speed_fl + i]
 
 
 @behind(types.void, CAR, VECTOR)
@@ -68,19 +69,19 @@ def copy_states(car, x):
         _rotate(q, (0.0, 1.0, 0.0)),
         _rotate(q, (0.0, 0.0, 1.0)),
     )
-    x[3] = math.atan2(left[2], up[2])
-    x[4] = -math.asin(min(max(ahead[2], -1.0), 1.0))
-    x[5] = math.atan2(ahead[1], ahead[0])
+    x[X.roll] = math.atan2(left[2], up[2])
+    x[X.pitch] = -math.asin(min(max(ahead[2], -1.0), 1.0))
+    x[X.yaw] = math.atan2(ahead[1], ahead[0])
     velocity = _unrotate(q, (qvel[0], qvel[1], qvel[2]))
     for i in range(3):
-        x[i] = qpos[i]
-        x[14 + i] = velocity[i]
-        x[17 + i] = qvel[3 + i]
+        x[X.x + i] = qpos[i]
+        x[X.vx + i] = velocity[i]
+        x[X.roll_rate + i] = qvel[3 + i]
     for i in range(4):
-        x[6 + i] = qpos[car.travel_qpos[i]]
-        x[10 + i] = qpos[car.spin_qpos[i]]
-        x[20 + i] = qvel[car.travel_dof[i]]
-        x[24 + i] = qvel[car.spin_dof[i]]
+        x[X.suspension_travel_fl + i] = qpos[car.travel_qpos[i]]
+        x[X.wheel_angle_fl + i] = qpos[car.spin_qpos[i]]
+        x[X.suspension_rate_fl + i] = qvel[car.travel_dof[i]]
+        x[X.wheel_speed_fl + i] = qvel[car.spin_dof[i]]
 
 
 @behind(types.int32, CAR)

@@ -5,11 +5,12 @@ import math
 from numba import types
 
 from twin.car_record import CAR
-from twin.channels import FORCES, OUTPUTS, PARAMETERS, TYRE_OUTPUTS
+from twin.channels import OUTPUTS, TYRE_OUTPUTS, U
 from twin.compiled.boundary import VECTOR, behind
 from twin.compiled.elementary import clip
 from twin.compiled.libmujoco import mj_step1, mj_step2
 from twin.compiled.simd import gather, inlined, load, pointer, scatter, unpack
+from twin.parameters import P
 from twin.tyre.contact import (
     LATERAL,
     LONGITUDINAL,
@@ -24,7 +25,6 @@ from twin.tyre.four_tyres import four_tyres
 
 AIR_DENSITY = 1.2  # [kg/m3]
 STATES = 3  # columns of the tyre state
-FIRST_FORCE = PARAMETERS.index(FORCES[0])
 
 
 @inlined
@@ -75,7 +75,7 @@ def _air(car):
 @inlined
 def _axle_forces(car, ground):
     """Lateral forces at each axle, along the body's y axis at the height of the road."""
-    front, rear = car.parameters[FIRST_FORCE], car.parameters[FIRST_FORCE + 1]
+    front, rear = car.parameters[P.axle_force_front], car.parameters[P.axle_force_rear]
     if front == 0.0 and rear == 0.0:
         return
     left = _axis(car, car.chassis, 1)
@@ -172,15 +172,16 @@ def _wheels(car, drive, brake, road, normal):
 @behind(types.void, CAR, VECTOR, VECTOR)
 def step_car(car, u, y):
     """See `twin.kernel.step`."""
-    _steer(car, u[0])
+    _steer(car, u[U.steering_wheel_angle])
     mj_step1(car.model, car.data)
     applied = pointer(car.qfrc_applied)
     for i in range(6):
         applied[i] = 0.0
     _air(car)
-    road = load(u, 9)
+    road = load(u, U.road_height_fl)
     _axle_forces(car, 0.25 * _total(road))
-    drive, brake = load(u, 1) * car.torque_share[0], load(u, 5) * car.torque_share[1]
+    drive = load(u, U.drive_torque_fl) * car.torque_share[0]
+    brake = load(u, U.brake_torque_fl) * car.torque_share[1]
     _wheels(car, drive, brake, road, _road_normal(car, unpack(road)))
     mj_step2(car.model, car.data)
     sensordata = pointer(car.sensordata)

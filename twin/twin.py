@@ -8,20 +8,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin import kernel
 from twin.car.fingerprint import fingerprint
-from twin.car.vehicle import SENSORS, Vehicle
+from twin.car.vehicle import Vehicle
 from twin.car_record import AXLES, DATA_VIEWS, MODEL_VIEWS, SCALED_TYRE, Car, new_car
 from twin.channels import (
+    CHANNEL,
     EXTENDED,
-    FORCES,
     INPUTS,
     OUTPUTS,
-    PARAMETERS,
-    SCALES,
+    ROAD_HEIGHTS,
     STATES,
+    TYRE,
     TYRE_OUTPUTS,
     WHEELS,
 )
 from twin.errors import TwinError
+from twin.parameters import FORCES, PARAMETERS, SCALES
 from twin.scales import TORQUES, bars
 from twin.tyre.contact import ROAD
 from twin.tyre.four_tyres import table_of
@@ -29,8 +30,6 @@ from twin.tyre.radius import effective_radius
 
 Array = NDArray[np.float64]
 SETTLING_STEPS = 20
-LARGEST_HAND_WHEEL = 15.0  # [rad], some two turns and a half; road wheels stay below 60 degrees
-LARGEST_TORQUE = 1e5  # [N m], far beyond what a wheel ever sees
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
@@ -88,15 +87,15 @@ class Twin:
         if not 0.0 <= speed <= 150.0:
             raise TwinError(f"reset: speed is {speed} m/s; allowed: 0 to 150")
         u = np.zeros(len(INPUTS))
-        u[9:] = road
+        u[ROAD_HEIGHTS] = road
         mujoco.mj_resetData(self.model, self.data)
-        ahead, normal = self._plane(u[9:])
+        ahead, normal = self._plane(u[ROAD_HEIGHTS])
         velocity, spin = speed * ahead, np.zeros(4)
-        pose = self._parallel_to(u[9:], ahead, normal)
+        pose = self._parallel_to(u[ROAD_HEIGHTS], ahead, normal)
         rest = [2, 3, 4, *self.car.travel_dof]
 
         def accelerations(pose: Array) -> Array:
-            self._place(pose, velocity, spin, u[9:])
+            self._place(pose, velocity, spin, u[ROAD_HEIGHTS])
             kernel.step(self.car, u, np.empty(len(OUTPUTS)))
             rates = self.data.qacc[rest]
             rates[0] = normal @ self.data.qacc[:3]  # a free car runs down its slope
@@ -115,7 +114,7 @@ class Twin:
             except np.linalg.LinAlgError:  # off the road: the tyres do not answer
                 break
             accelerations(pose)
-            loads = self.car.tyre_output[:, 2]  # the rolling radius hangs on them, if weakly
+            loads = self.car.tyre_output[:, TYRE.fz]  # the rolling radius hangs on them, if weakly
             spin[:] = [
                 speed / effective_radius(t, z) for t, z in zip(self._tyres, loads, strict=True)
             ]
@@ -124,7 +123,7 @@ class Twin:
                 f"{self.vehicle.source}: the car does not settle on its wheels at {speed} m/s; "
                 f"accelerations of {residual:.3g} m/s2 remain"
             )
-        self._place(pose, velocity, spin, u[9:])
+        self._place(pose, velocity, spin, u[ROAD_HEIGHTS])
         self.data.time = 0.0
 
     def _plane(self, road: Array) -> tuple[Array, Array]:
@@ -239,8 +238,8 @@ def check_inputs(inputs: Array, what: str) -> None:
     """
     if inputs.ndim != 2 or inputs.shape[1] != len(INPUTS):
         raise TwinError(f"{what}: inputs have shape {inputs.shape}; allowed: (n, {len(INPUTS)})")
-    low = np.array([-LARGEST_HAND_WHEEL] + [-LARGEST_TORQUE] * 4 + [0.0] * 4 + [-1e4] * 4)
-    high = np.array([LARGEST_HAND_WHEEL] + [LARGEST_TORQUE] * 8 + [1e4] * 4)
+    low = np.array([CHANNEL[name].low for name in INPUTS])
+    high = np.array([CHANNEL[name].high for name in INPUTS])
     good = (inputs >= low) & (inputs <= high)
     if not good.all():
         row, column = np.argwhere(~good)[0]
@@ -267,8 +266,10 @@ def _bind(
     wheels = [model.body(f"wheel_{w}").id for w in WHEELS]
     travels = [model.joint(f"travel_{w}").id for w in WHEELS]
     spins = [model.joint(f"spin_{w}").id for w in WHEELS]
-    addresses = [model.sensor_adr[model.sensor(name).id] for name in SENSORS]
-    ax, roll_rate, *wheel_speeds = addresses
+    sensors = [
+        model.sensor_adr[model.sensor(CHANNEL[name].sensor).id] + CHANNEL[name].axis
+        for name in OUTPUTS
+    ]
     hubs = np.array([model.body_pos[model.body_parentid[wheel]] for wheel in wheels])
     # MuJoCo takes the inertial frame for the body frame where the file has them equal.
     model.body_sameframe[chassis] = 0
@@ -289,7 +290,7 @@ def _bind(
         travel_dof=model.jnt_dofadr[travels].astype(np.int64),
         spin_qpos=model.jnt_qposadr[spins].astype(np.int64),
         spin_dof=model.jnt_dofadr[spins].astype(np.int64),
-        sensor=np.array([*range(ax, ax + 3), *range(roll_rate, roll_rate + 3), *wheel_speeds]),
+        sensor=np.array(sensors),
         dt=float(model.opt.timestep),
         wheelbase=float(hubs[:2, 0].mean() - hubs[2:, 0].mean()),
         track=float(hubs[0, 1] - hubs[1, 1]),

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from twin import TwinError
-from twin.scales import LARGEST_SCALE, LEAST_SCALE, VEHICLE_SCALES
+from twin.parameters import LARGEST_SCALE, LEAST_SCALE
+from twin.scales import VEHICLE_SCALES
 
 Kind = Literal["scale", "load", "offset", "follower", "gain"]
 

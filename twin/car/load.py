@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.channels import FORCES, SCALES
 from twin.errors import TwinError
+from twin.parameters import LOAD, PARAMETERS
 
-# The entries of the inertia tensor in the order of `twin.channels.LOAD`
+# The entries of the inertia tensor in the order of `twin.parameters.LOAD`
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 # Rounding that a valid inertia may show, of its largest entry
 _ROUNDING = 1e-12
@@ -92,7 +92,7 @@ def parameter_deltas(nominal: RigidBody, changed: RigidBody) -> NDArray[np.float
 
     A load changes no scale and pushes no axle: those are zero.
     """
-    rest = np.zeros(len(SCALES) + len(FORCES))
+    rest = np.zeros(len(PARAMETERS) - len(LOAD))
     return np.append(_parameters(changed) - _parameters(nominal), rest)
 
 

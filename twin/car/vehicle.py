@@ -11,9 +11,10 @@ import models
 from twin.car.load import PointMass, RigidBody
 from twin.car.mjcf import read_mjcf, tyre_path
 from twin.car.toml_car import car_spec, car_tyres
-from twin.channels import WHEELS
+from twin.channels import CHANNEL, OUTPUTS, WHEELS
 from twin.errors import TwinError
-from twin.scales import LARGEST_SCALE, LEAST_SCALE, VEHICLE_SCALES, scale_model, scale_tyres
+from twin.parameters import LARGEST_SCALE, LEAST_SCALE
+from twin.scales import VEHICLE_SCALES, scale_model, scale_tyres
 from twin.tyre.files import read_tyre_file
 
 # Numbers of <custom> that every car needs, with the least that is allowed
@@ -24,12 +25,8 @@ NUMBERS = {
     "lift_area_front": -10.0,  # -c_L A of each axle [m2], positive pushes down
     "lift_area_rear": -10.0,
 }
-SENSOR_KINDS = {
-    "acceleration": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
-    "rates": mujoco.mjtSensor.mjSENS_GYRO,
-    **{f"wheel_speed_{w}": mujoco.mjtSensor.mjSENS_JOINTVEL for w in WHEELS},
-}
-SENSORS = tuple(SENSOR_KINDS)
+# Sensors that measure the outputs, and the kind of each
+SENSORS = {CHANNEL[name].sensor: CHANNEL[name].sensor_kind for name in OUTPUTS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +128,7 @@ class Vehicle:
                 mujoco.mjtObj.mjOBJ_JOINT,
                 ("chassis", *(f"{j}_{w}" for w in WHEELS for j in ("travel", "spin"))),
             ),
-            "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, SENSORS),
+            "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, tuple(SENSORS)),
             "site": (mujoco.mjtObj.mjOBJ_SITE, ("imu",)),
             "numeric": (mujoco.mjtObj.mjOBJ_NUMERIC, tuple(NUMBERS)),
             "text": (mujoco.mjtObj.mjOBJ_TEXT, ("tyre_front", "tyre_rear")),
@@ -140,10 +137,9 @@ class Vehicle:
             for name in names:
                 if mujoco.mj_name2id(model, code, name) < 0:
                     raise TwinError(f"{self.source}: has no {kind} named {name!r}; a car needs one")
-        for name, kind in SENSOR_KINDS.items():
-            if model.sensor(name).type[0] != kind:
-                wanted = kind.name.removeprefix("mjSENS_").lower()
-                raise TwinError(f"{self.source}: sensor {name} must be of the kind {wanted}")
+        for name, kind in SENSORS.items():
+            if model.sensor(name).type[0] != getattr(mujoco.mjtSensor, f"mjSENS_{kind.upper()}"):
+                raise TwinError(f"{self.source}: sensor {name} must be of the kind {kind}")
         if model.site("imu").pos.any():
             raise TwinError(f"{self.source}: site imu must stand at the origin of the chassis")
         if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET:

@@ -21,6 +21,7 @@ from numba.extending import register_jitable
 from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
+from twin.channels import U
 from twin.compiled.boundary import VECTOR, behind
 from twin.errors import TwinError
 
@@ -132,9 +133,10 @@ def advance(car, x, u, steering_ratio, dt, torque):
     Returns:
         The (29,) rates before the step.
     """
-    x[STEER] = -u[0] / steering_ratio
+    x[STEER] = -u[U.steering_wheel_angle] / steering_ratio
     for w in range(4):
-        torque[w] = u[1 + w] - (u[5 + w] if x[WHEEL + w] > 0.0 else 0.0)
+        braking = u[U.brake_torque_fl + w] if x[WHEEL + w] > 0.0 else 0.0
+        torque[w] = u[U.drive_torque_fl + w] - braking
     first = derivative(car, x, torque)
     total, before = first.copy(), first
     for weight, share in ((2.0, 0.5), (2.0, 0.5), (1.0, 1.0)):

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from twin.channels import INPUTS, OUTPUTS
+from twin.channels import INPUTS, OUTPUTS, ROAD_HEIGHTS
 from twin.commonroad.axes import COMMONROAD_STATES, measurements, move, our_states
 from twin.commonroad.model import (
     LEAST_SPEED,
@@ -88,8 +88,10 @@ class CommonRoadTwin:
                 locked a wheel or blown up.
         """
         u = _vector(u, len(INPUTS), "step")
-        if u[9:].any():
-            raise TwinError(f"commonroad step: road heights are {u[9:].tolist()} m; allowed: zeros")
+        if u[ROAD_HEIGHTS].any():
+            raise TwinError(
+                f"commonroad step: road heights are {u[ROAD_HEIGHTS].tolist()} m; allowed: zeros"
+            )
         before = self._x.tolist()
         rates = advance(self._car, self._x, u, STEERING_RATIO, self.dt, self._torque)
         self._time += self.dt
