@@ -97,12 +97,13 @@ def record(
         input_names=INPUTS,
         measurements=outputs,
         output_names=OUTPUTS,
-        truth=_truth(vehicle, states, outputs, tyres),
+        truth=truth_of(vehicle, states, outputs, tyres),
         settings={"manoeuvre": manoeuvre.name, "vehicle": vehicle.source.name},
     )
 
 
-def _truth(vehicle: Vehicle, states: Array, outputs: Array, tyres: Array) -> dict[str, Array]:
+def truth_of(vehicle: Vehicle, states: Array, outputs: Array, tyres: Array) -> dict[str, Array]:
+    """What is true of a drive, by name: see `record`."""
     truth = {name: states[:, i] for i, name in enumerate(STATES)}
     truth |= {name: outputs[:, i] for i, name in enumerate(OUTPUTS) if name not in truth}
     truth["sideslip"] = np.arctan2(truth["vy"], np.maximum(truth["vx"], 1e-3))

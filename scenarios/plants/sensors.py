@@ -53,7 +53,7 @@ def measured(clean: Drive, sensors: Sensors, snr: float, rng: np.random.Generato
     if clean.output_names != OUTPUTS:
         raise TwinError(f"sensors: drive has {clean.output_names}; allowed: {OUTPUTS}")
     y = clean.measurements.copy()
-    y[:, ACCELERATIONS] += _lever(y[:, RATES], sensors.position, clean.dt)
+    y[:, ACCELERATIONS] += lever(y[:, RATES], sensors.position, clean.dt)
     y = _delayed(y, round(sensors.delay / clean.dt))
     y[:, ACCELERATIONS] += sensors.acceleration_bias
     y[:, RATES] += sensors.rate_bias
@@ -69,7 +69,7 @@ def measured(clean: Drive, sensors: Sensors, snr: float, rng: np.random.Generato
     )
 
 
-def _lever(rates: Array, position: ArrayLike, dt: float) -> Array:
+def lever(rates: Array, position: ArrayLike, dt: float) -> Array:
     """(N, 3) acceleration of a point of the body relative to its origin, by rigid kinematics."""
     r = np.asarray(position, dtype=np.float64)
     if not r.any():
