@@ -3,7 +3,9 @@
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from twin import Twin
 
 Array = NDArray[np.float64]
 
@@ -64,3 +66,17 @@ class BlackBox(Protocol):
     def read_states(self) -> Array:
         """The states (nx,) now."""
         ...
+
+
+def settle(twin: BlackBox, speed: float, road: ArrayLike | None = None) -> None:
+    """Settles a twin.
+
+    Args:
+        twin: any black box; all but `twin.Twin` choose their own road.
+        speed: [m/s].
+        road: (4,) height under each wheel [m]; None: zero.
+    """
+    if isinstance(twin, Twin):
+        twin.reset(speed, np.zeros(4) if road is None else road)
+    else:
+        twin.reset(speed)

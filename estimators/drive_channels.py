@@ -12,7 +12,7 @@ from twin import Drive, Twin, TwinError
 Array = NDArray[np.float64]
 
 
-class Given(NamedTuple):
+class DriveChannels(NamedTuple):
     """What a drive gives to the observer of a twin."""
 
     inputs: Array  # (N, nu), torques zero where the twin is to follow the speed
@@ -20,7 +20,7 @@ class Given(NamedTuple):
     speed: Array  # (N,) to follow [m/s]; (0,) where the drive has torques
 
 
-def given_by(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> Given:
+def given_by(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> DriveChannels:
     """Inputs and measurements in the twin's order.
 
     Raises:
@@ -39,7 +39,7 @@ def given_by(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> Gi
         raise TwinError(f"drive: has channels {has}, the twin needs {needed} in this order")
     measurements = np.ascontiguousarray(drive.measurements[:, :ny])
     if drive.input_names == twin.inputs:
-        return Given(drive.inputs, measurements, np.empty(0))
+        return DriveChannels(drive.inputs, measurements, np.empty(0))
     if follower is None or not isinstance(twin, Twin) or "vx" not in drive.output_names:
         raise TwinError(
             "drive: has no torques; allowed: with a measured vx, a `Twin` and a speed follower"
@@ -52,7 +52,7 @@ def given_by(drive: Drive, twin: BlackBox, follower: SpeedFollower | None) -> Gi
         )
     inputs = np.zeros((len(drive), len(twin.inputs)))
     inputs[:, [twin.inputs.index(name) for name in torqueless]] = drive.inputs
-    return Given(inputs, measurements, speed)
+    return DriveChannels(inputs, measurements, speed)
 
 
 def check_measurements(y: Array, names: tuple[str, ...], what: str, *, infinite: bool) -> None:

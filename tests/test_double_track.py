@@ -31,7 +31,13 @@ def drive():
 
 
 def run(drive, gains=NONE, mass=0.0):
-    return double_track.run(CAR, gains, drive, SPEED, mass)
+    return of_car(CAR, drive, gains, mass)
+
+
+def of_car(car, drive, gains=NONE, mass=0.0):
+    observer = double_track.DoubleTrackObserver(car, gains)
+    observer.reset(SPEED, {"mass": mass})
+    return observer.run(drive)
 
 
 def test_magic_formula_has_slope_bcd_and_peak_d():
@@ -111,12 +117,11 @@ def test_accelerations_do_not_depend_on_the_mass(drive):
         rear=CAR.rear._replace(lift_area=0.0),
     )
     light, heavy = (
-        double_track.run(
-            no_air._replace(yaw_inertia=CAR.yaw_inertia * (1.0 + mass / CAR.mass)),
-            NONE, drive, SPEED, mass,
+        of_car(
+            no_air._replace(yaw_inertia=CAR.yaw_inertia * (1.0 + mass / CAR.mass)), drive, mass=mass
         )
         for mass in (-300.0, 300.0)
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(light.outputs, heavy.outputs, atol=1e-9)
     with_air = [run(drive, mass=mass)["ax"] for mass in (-300.0, 300.0)]
     assert np.abs(with_air[0] - with_air[1]).max() > 1e-3  # drag keeps a trace

@@ -135,9 +135,8 @@ def test_delay_and_bias_of_the_sensors_are_found(drive):
     made = JointObserver(Vehicle.load("suv"), sd, JointSettings(parameters=("mass",)))
     made.reset(float(drive.truth["vx"][0]), variation())
     run = made.run(drive.replace(measurements=y))
-    found = dict(zip(run.fault_names, run.faults[-1], strict=True))
-    assert found["delay"] == pytest.approx(0.02, abs=2e-4)
-    assert found["bias_ay"] == pytest.approx(0.1, abs=0.01)
+    assert run["delay"][-1] == pytest.approx(0.02, abs=2e-4)
+    assert run["bias_ay"][-1] == pytest.approx(0.1, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimators.benchmarks.kalman_bucy import KalmanBucy, KalmanBucySettings, detecting, matched
-from twin import TruckParameters, TwinError
+from estimators.benchmarks.kalman_bucy import (
+    CHANNELS,
+    DEFLECTIONS,
+    RATES,
+    KalmanBucy,
+    KalmanBucySettings,
+    detecting,
+    matched,
+)
+from twin import Drive, TruckParameters, TwinError
 from twin.road import iso8608_road
+from twin.truck import model
 from twin.truck.model import LoadStage, Truck
 from twin.truck.parameters import SprungMass
 
@@ -26,6 +35,27 @@ def measured(run, seed=0):
     return run.rates + np.array(SENSORS) * np.random.default_rng(seed).normal(size=run.rates.shape)
 
 
+def as_drive(run, rates, deflections=None, every=slice(None)):
+    """What the filter sees of a run."""
+    seen = run.deflections if deflections is None else deflections
+    return Drive(
+        time=run.time[every],
+        inputs=np.zeros((len(run.time[every]), 1)),
+        input_names=("none",),
+        measurements=np.hstack([rates, seen])[every],
+        output_names=CHANNELS,
+    )
+
+
+def run_filter(run, rates, settings=None, dt=DT):
+    every = slice(None, None, round(dt / DT))
+    return KalmanBucy(TruckParameters(), dt, settings).run(as_drive(run, rates, every=every))
+
+
+def absolute(found):
+    return found.nominal + found.parameters
+
+
 @pytest.fixture(scope="module")
 def drive():
     return record(stages=[LoadStage(2.0, SprungMass().scaled(1.5))])
@@ -34,11 +64,9 @@ def drive():
 @pytest.mark.parametrize("parametrisation", PARAMETRISATIONS)
 def test_every_parametrisation_finds_the_load_before_and_after_a_step(drive, parametrisation):
     settings = replace(matched(SENSORS, DT), parametrisation=parametrisation)
-    found = KalmanBucy(TruckParameters(), DT, settings).run(
-        drive.time, drive.deflections, measured(drive)
-    )
+    found = run_filter(drive, measured(drive), settings)
     for k in (1999, 2999):
-        np.testing.assert_allclose(found.parameters[k], drive.parameters[k], rtol=0.05)
+        np.testing.assert_allclose(absolute(found)[k], drive.parameters[k], rtol=0.05)
 
 
 @pytest.mark.parametrize(
@@ -51,23 +79,30 @@ def test_every_parametrisation_finds_the_load_before_and_after_a_step(drive, par
 )
 def test_sample_by_sample_equals_the_whole_drive_to_the_bit(drive, settings):
     rates = measured(drive)
-    whole = KalmanBucy(TruckParameters(), DT, settings)
-    run = whole.run(drive.time, drive.deflections, rates)
+    seen = as_drive(drive, rates)
+    run = KalmanBucy(TruckParameters(), DT, settings).run(seen)
     streaming = KalmanBucy(TruckParameters(), DT, settings)
     for k in range(500):
-        one = streaming.update(drive.deflections[k], rates[k])
-        for mine, theirs in zip(one, run, strict=True):
-            np.testing.assert_array_equal(mine, theirs[k])
+        one = streaming.update(seen.inputs[k], seen.measurements[k])
+        np.testing.assert_allclose(one, run.parameters[k], rtol=1e-12, atol=1e-9)
+        np.testing.assert_array_equal(streaming.state.mean[:, 0], run.states[k])
 
 
 def test_reset_and_a_second_run_forget_the_first(drive):
     observer = KalmanBucy(TruckParameters(), DT, detecting(matched(SENSORS, DT)))
-    first = observer.run(drive.time, drive.deflections, measured(drive))
-    again = observer.run(drive.time, drive.deflections, measured(drive))
+    seen = as_drive(drive, measured(drive))
+    first = observer.run(seen)
+    again = observer.run(seen)
     np.testing.assert_array_equal(first.parameters, again.parameters)
     observer.reset()
-    fresh = observer.update(drive.deflections[0], drive.rates[0])
-    np.testing.assert_array_equal(fresh.parameters, 2 * NOMINAL)
+    np.testing.assert_array_equal(observer.update(seen.inputs[0], seen.measurements[0]), NOMINAL)
+    observer.reset(parameters={"mass": 100.0})
+    fresh = observer.update(seen.inputs[0], seen.measurements[0])
+    np.testing.assert_allclose(fresh, [100.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_channels_are_those_of_the_truck():
+    assert (RATES, DEFLECTIONS) == (model.RATES, model.DEFLECTIONS)
 
 
 def textbook_filter(run, rates, settings):
@@ -96,9 +131,9 @@ def textbook_filter(run, rates, settings):
 @pytest.mark.parametrize("settings", [KalmanBucySettings(), matched(SENSORS, DT)])
 def test_inverse_mass_filter_is_the_textbook_kalman_filter(drive, settings):
     rates = measured(drive)
-    found = KalmanBucy(TruckParameters(), DT, settings).run(drive.time, drive.deflections, rates)
+    found = run_filter(drive, rates, settings)
     expected = textbook_filter(drive, rates, settings)
-    np.testing.assert_allclose(found.parameters, expected, rtol=1e-6)
+    np.testing.assert_allclose(absolute(found), expected, rtol=1e-6)
 
 
 def drifting_load(rng, q, seconds, hold):
@@ -118,11 +153,9 @@ def test_covariance_is_honest_about_a_load_that_drifts_as_assumed():
         stages = drifting_load(np.random.default_rng(seed), q, 4.0, 0.02)
         run = record(4.0, seed, stages)
         settings = replace(matched(SENSORS, DT, parameter_density=q), velocity_density=1e-9)
-        found = KalmanBucy(TruckParameters(), DT, settings).run(
-            run.time, run.deflections, measured(run, seed)
-        )
-        error = (found.parameters - run.parameters) / found.parameters_sd
-        rate_error = (found.velocity - run.rates) / found.velocity_sd
+        found = run_filter(run, measured(run, seed), settings)
+        error = (absolute(found) - run.parameters) / found.sd
+        rate_error = (found.states - run.rates) / found.states_sd
         squares.append(np.concatenate([error[1000:], rate_error[1000:]], axis=1) ** 2)
     nees = np.mean(squares, axis=(0, 1))
     assert nees.min() > 0.6
@@ -131,32 +164,27 @@ def test_covariance_is_honest_about_a_load_that_drifts_as_assumed():
 
 def test_a_constant_load_is_estimated_better_than_the_drift_allowed_for():
     run = record(3.0)
-    found = KalmanBucy(TruckParameters(), DT, matched(SENSORS, DT)).run(
-        run.time, run.deflections, measured(run)
-    )
-    error = np.abs(found.parameters - run.parameters) / found.parameters_sd
+    found = run_filter(run, measured(run), matched(SENSORS, DT))
+    error = np.abs(absolute(found) - run.parameters) / found.sd
     assert (error[1000:] < 3).mean() > 0.99
 
 
 def test_gravity_aware_filter_weighs_the_load():
     run = record(4.0, stages=[LoadStage(2.0, SprungMass().scaled(1.5))], gravity=9.81)
-    aware = KalmanBucy(TruckParameters(), DT, gravity=9.81)
-    found = aware.run(run.time, run.deflections, measured(run))
-    error = np.abs(found.parameters / run.parameters - 1)[:, 0]
+    found = run_filter(run, measured(run), KalmanBucySettings(gravity=9.81))
+    error = np.abs(absolute(found) / run.parameters - 1)[:, 0]
     assert error.mean() < 0.01
     assert error[2015:].max() < 0.1
-    unaware = KalmanBucy(TruckParameters(), DT).run(run.time, run.deflections, measured(run))
-    assert np.abs(unaware.parameters / run.parameters - 1)[3000:, 0].mean() > 0.5
+    unaware = run_filter(run, measured(run))
+    assert np.abs(absolute(unaware) / run.parameters - 1)[3000:, 0].mean() > 0.5
 
 
 def test_detection_finds_a_load_change_sooner(drive):
     slow = matched(SENSORS, DT, parameter_density=1e-5)
     late = {}
     for name, settings in (("plain", slow), ("sharp", detecting(slow, robust=False))):
-        found = KalmanBucy(TruckParameters(), DT, settings).run(
-            drive.time, drive.deflections, measured(drive)
-        )
-        wrong = np.abs(found.parameters / drive.parameters - 1)[2000:] > 0.1
+        found = run_filter(drive, measured(drive), settings)
+        wrong = np.abs(absolute(found) / drive.parameters - 1)[2000:] > 0.1
         late[name] = wrong.sum(axis=0) * DT
     assert (late["sharp"] < 0.1).all()
     assert (late["plain"] > 2 * late["sharp"]).all()
@@ -164,43 +192,42 @@ def test_detection_finds_a_load_change_sooner(drive):
 
 def test_filter_stays_sound_at_ten_milliseconds(drive):
     every = slice(0, 2000, 10)
-    found = KalmanBucy(TruckParameters(), 0.01).run(
-        drive.time[every], drive.deflections[every], measured(drive)[every]
-    )
-    np.testing.assert_allclose(found.parameters[-50:].mean(axis=0), NOMINAL, rtol=0.1)
+    found = KalmanBucy(TruckParameters(), 0.01).run(as_drive(drive, measured(drive), every=every))
+    np.testing.assert_allclose(absolute(found)[-50:].mean(axis=0), NOMINAL, rtol=0.1)
 
 
 def test_estimates_stay_within_the_bounds(drive):
     noise = np.random.default_rng(0).normal(size=drive.rates.shape)
-    found = KalmanBucy(TruckParameters(), DT).run(drive.time, drive.deflections, noise)
-    assert (found.parameters >= 0.05 * NOMINAL * (1 - 1e-12)).all()
-    assert (found.parameters <= 20 * NOMINAL * (1 + 1e-12)).all()
+    found = run_filter(drive, noise)
+    assert (absolute(found) >= 0.05 * NOMINAL * (1 - 1e-12)).all()
+    assert (absolute(found) <= 20 * NOMINAL * (1 + 1e-12)).all()
 
 
 def test_a_missing_channel_is_named(drive):
     observer = KalmanBucy(TruckParameters(), DT)
-    with pytest.raises(TwinError, match=r"deflections: shape \(3000, 7\), must be \(3000, 8\)"):
-        observer.run(drive.time, drive.deflections[:, :7], drive.rates)
-    with pytest.raises(TwinError, match=r"rates: shape \(2,\), must be \(3,\)"):
-        observer.update(drive.deflections[0], drive.rates[0, :2])
+    seen = as_drive(drive, drive.rates)
+    with pytest.raises(TwinError, match="deflection_rate_rr"):
+        observer.run(
+            seen.replace(measurements=seen.measurements[:, :-1], output_names=CHANNELS[:-1])
+        )
+    with pytest.raises(TwinError, match=r"measurements: shape \(10,\), must be \(11,\)"):
+        observer.update(seen.inputs[0], seen.measurements[0, :-1])
 
 
 def test_a_value_that_is_not_finite_is_located(drive):
     spoilt = drive.deflections.copy()
     spoilt[7, 2] = np.nan
     observer = KalmanBucy(TruckParameters(), DT)
-    with pytest.raises(TwinError, match=r"deflections: nan at index \(7, 2\)"):
-        observer.run(drive.time, spoilt, drive.rates)
-    with pytest.raises(TwinError, match=r"rates: inf at index \(0,\)"):
-        observer.update(drive.deflections[0], [np.inf, 0, 0])
+    with pytest.raises(TwinError, match="deflection_rl: nan in sample 7"):
+        observer.run(as_drive(drive, drive.rates, spoilt))
+    with pytest.raises(TwinError, match="vz: inf, must be finite"):
+        observer.update([0.0], [np.inf, *np.zeros(10)])
 
 
 def test_a_missing_sample_is_located(drive):
     keep = np.delete(np.arange(3000), 1234)
     with pytest.raises(TwinError, match=r"1.235 s follows 1.233 s"):
-        KalmanBucy(TruckParameters(), DT).run(
-            drive.time[keep], drive.deflections[keep], drive.rates[keep]
-        )
+        KalmanBucy(TruckParameters(), DT).run(as_drive(drive, drive.rates, every=keep))
 
 
 @pytest.mark.parametrize("sample_time", [0.0, -1e-3, 0.05, np.nan])
@@ -221,6 +248,7 @@ def test_an_impossible_sample_time_is_refused(sample_time):
         {"bounds": (2.0, 1.0)},
         {"gate": 0.0},
         {"window": 0},
+        {"gravity": -9.81},
     ],
 )
 def test_impossible_settings_are_refused_by_name(bad):

@@ -2,12 +2,17 @@ import numpy as np
 import pytest
 from cars import drive_of_other_car
 
+from estimators.ensemble.offline_fit import OfflineFit
 from estimators.identifiability.cramer_rao import limits, sensitivities
-from estimators.peers.offline_fit import offline_fit
 from twin import OUTPUTS, Twin, TwinError, Vehicle
 
 LOAD = {"mass": 200.0, "cm_x": -0.05, "Jzz": 300.0}
 SECONDS = 3.0
+
+
+def observe(observer, drive, speed):
+    observer.reset(speed, road=drive.inputs[0, 9:13])
+    return observer.run(drive)
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +21,7 @@ def rich():
 
 
 def fit(drive, sd, speed, **changes):
-    return offline_fit(Vehicle.load("suv"), drive, sd, tuple(LOAD), speed=speed, **changes)
+    return observe(OfflineFit(Vehicle.load("suv"), sd, tuple(LOAD), **changes), drive, speed)
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +58,9 @@ def test_channel_without_measurements_is_left_out(rich):
     gap[:, OUTPUTS.index("ay")] = np.nan
     unused = np.where(np.arange(len(OUTPUTS)) == OUTPUTS.index("ay"), np.nan, sd)
     vehicle = Vehicle.load("suv")
-    without = offline_fit(vehicle, drive.replace(measurements=gap), sd, ("mass",), speed=speed)
-    never = offline_fit(vehicle, drive, unused, ("mass",), speed=speed)
+    missing = drive.replace(measurements=gap)
+    without = observe(OfflineFit(vehicle, sd, ("mass",)), missing, speed)
+    never = observe(OfflineFit(vehicle, unused, ("mass",)), drive, speed)
     assert without["mass"][-1] == pytest.approx(never["mass"][-1], rel=1e-12)
 
 
@@ -64,6 +70,6 @@ def test_narrow_prior_holds_a_parameter(rich):
 
 
 def test_unknown_parameter_is_refused(rich):
-    drive, sd, speed = rich
+    _, sd, _ = rich
     with pytest.raises(TwinError, match="fit: parameter 'weight' is unknown; allowed: mass,"):
-        offline_fit(Vehicle.load("suv"), drive, sd, ("weight",), speed=speed)
+        OfflineFit(Vehicle.load("suv"), sd, ("weight",))

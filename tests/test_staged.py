@@ -3,8 +3,8 @@ import pytest
 from cars import drive_of_other_car
 from scipy.signal import lfilter
 
-from estimators.joint.observer import PRIOR_SD
-from estimators.peers.staged import CM, Stage, StagedSettings, staged
+from estimators.ensemble.staged import CM, Stage, StagedObserver, StagedSettings
+from estimators.priors import PRIOR_SD
 from scenarios.driving.joint_drives import mixed
 from scenarios.driving.record import record
 from scenarios.experiment import study
@@ -13,6 +13,15 @@ from twin import TwinError, Vehicle, noise_sd, with_noise
 
 # Short stages for a short drive
 SETTINGS = StagedSettings(mass_seconds=1.5, pitch_seconds=1.0, cm_seconds=4.0)
+
+
+def observe(observer, drive, speed):
+    observer.reset(speed, road=drive.inputs[0, 9:13])
+    return observer.run(drive)
+
+
+def staged(*arguments, speed, drive):
+    return observe(StagedObserver(Vehicle.load("suv"), *arguments), drive, speed)
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +35,7 @@ def rich():
 def staged_run(rich):
     noisy, sd = rich
     speed = float(noisy.truth["vx"][0])
-    return staged(Vehicle.load("suv"), noisy, sd, STAGED_LAWS, SETTINGS, speed=speed)
+    return staged(sd, STAGED_LAWS, SETTINGS, speed=speed, drive=noisy)
 
 
 def test_stages_follow_each_other_in_the_order_of_figure_12(staged_run):
@@ -64,7 +73,7 @@ def test_cm_is_found_exactly_where_nothing_else_is_wrong():
     load = {"cm_x": -0.06, "cm_y": 0.02, "cm_z": 0.04}
     noisy, sd, speed = drive_of_other_car(load, seconds=14.0, snr=float("inf"))
     early = StagedSettings(mass_seconds=0.02, pitch_seconds=0.02, cm_seconds=8.0)
-    found = staged(Vehicle.load("suv"), noisy, sd, STAGED_LAWS, early, speed=speed)
+    found = staged(sd, STAGED_LAWS, early, speed=speed, drive=noisy)
     for name, value in load.items():
         assert found[name][-1] == pytest.approx(value, rel=0.1)
 
@@ -80,9 +89,9 @@ def test_clock_of_the_first_stage_counts_straight_driving_alone(staged_run, rich
 
 
 def test_missing_or_doubled_law_is_refused(rich):
-    noisy, sd = rich
+    _, sd = rich
     with pytest.raises(TwinError, match="laws are of mass, Jyy, Jxx; allowed: mass, Jxx, Jyy, Jzz"):
-        staged(Vehicle.load("suv"), noisy, sd, STAGED_LAWS[:-1], speed=14.0)
+        StagedObserver(Vehicle.load("suv"), sd, STAGED_LAWS[:-1])
 
 
 def test_stage_without_time_is_refused():

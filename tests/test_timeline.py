@@ -10,8 +10,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 import twin
-from estimators.estimate import Estimate
-from estimators.peers.staged import Stage, StagedEstimate
+from estimators.base import Estimate
+from estimators.ensemble.staged import Stage, StagedEstimate
 from scenarios.timeline import scene as timeline_3d
 from scenarios.timeline import timeline
 from scenarios.timeline.timeline import view, write_timeline
@@ -374,10 +374,8 @@ def test_stages_of_a_staged_observer_are_drawn(tmp_path, vehicle):
     plain = make_estimate()
     stage = np.repeat(list(Stage), SAMPLES // len(Stage))
     staged = StagedEstimate(
-        **{field.name: getattr(plain, field.name) for field in dataclasses.fields(plain)},
-        stage=stage,
-        estimated=("mass",),
-        sd=np.ones((SAMPLES, 1)),
+        **{field.name: getattr(plain, field.name) for field in dataclasses.fields(plain)}
+        | {"stage": stage, "estimated": ("mass",), "sd": np.ones((SAMPLES, 1))},
     )
     without = write(tmp_path / "without.rrd", vehicle)
     path = write(tmp_path / "with.rrd", vehicle, estimate=staged)

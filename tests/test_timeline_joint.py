@@ -4,7 +4,8 @@ from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 import twin
-from estimators.joint.observer import FAULT_SD, FAULTS, PRIOR_SD, JointEstimate
+from estimators.joint.observer import FAULT_SD, FAULTS, JointEstimate
+from estimators.priors import PRIOR_SD
 from scenarios.timeline import timeline
 from scenarios.timeline.inertia import uniform_ellipsoid
 from scenarios.timeline.joint import write_joint_timeline
@@ -56,12 +57,12 @@ def make(seconds):
         extended=np.zeros((n, len(twin.EXTENDED))),
         nominal=NOMINAL,
         estimated=ESTIMATED,
-        fault_names=FAULTS,
+        sensor_error_names=FAULTS,
         prior=prior,
         sd=sd,
         valid=np.repeat((time >= FOUND_AT[0])[:, None], prior.size, axis=1),
         changes=(time >= FOUND_AT[1]).astype(np.int64),
-        faults=0.1 * prior[P:] * rng.standard_normal((n, prior.size - P)),
+        sensor_errors=0.1 * prior[P:] * rng.standard_normal((n, prior.size - P)),
         covariance=np.diag(sd[-1] ** 2),
         information=np.diag(sd[-1] ** -2.0),
     )
@@ -110,7 +111,7 @@ def test_estimate_stands_in_a_band_of_two_standard_deviations(rows, run, entity)
     drawn = np.array(rows[f"/{entity}/estimate"]["Scalars:scalars"])
     i = ESTIMATED.index(entity.split("/")[1])
     samples = timeline.thinned(estimate.time, 100.0)
-    values = np.column_stack([estimate.parameters[:, :P], estimate.faults])[samples, i]
+    values = np.column_stack([estimate.parameters[:, :P], estimate.sensor_errors])[samples, i]
     np.testing.assert_allclose(drawn[:, 2], values)
     sd = estimate.sd[samples, i]
     np.testing.assert_allclose(drawn[:, :2] - values[:, None], np.outer(sd, (2.0, -2.0)))

@@ -88,7 +88,10 @@ def test_scores_are_the_errors_of_equation_10():
     load = truth(drive, TRUCK_PARAMETERS)
     wrong = load * np.array([1.05, 0.9, 1.2])
     wrong[7000:7250, 0] *= 1.3
-    scores = score(drive, found._replace(parameters=wrong, velocity=truth(drive, RATES) + 0.01))
+    rates = truth(drive, RATES) + 0.01
+    scores = score(
+        drive, dataclasses.replace(found, parameters=wrong - found.nominal, outputs=rates)
+    )
     assert scores["Jxx", "mape_pct"] == pytest.approx(10)
     assert scores["Jyy", "rmse"] == pytest.approx(0.2 * np.sqrt(np.mean(load[:, 2] ** 2)))
     assert scores["vz", "rmse"] == pytest.approx(0.01)

@@ -1,8 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from estimators.benchmarks.kalman_bucy import Estimate
 from scenarios.papers.truck_drive import TruckCase, make_drive
 from scenarios.papers.truck_estimators import ESTIMATORS
 from scenarios.timeline.truck import write_truck_timeline
@@ -22,7 +23,7 @@ def found(drive):
 
 @pytest.fixture(scope="module")
 def other(found):
-    return found._replace(parameters=found.parameters + 1.0)
+    return replace(found, parameters=found.parameters + 1.0)
 
 
 def read(path):
@@ -65,12 +66,12 @@ def test_entities_hold_the_load_the_velocities_and_the_truck(recorded):
 
 def test_band_is_two_standard_deviations_around_the_first_estimate(recorded, found, other):
     shown = np.append(np.arange(0, 1000, 10), 999)
-    jxx, sd = found.parameters[shown, 1], found.parameters_sd[shown, 1]
+    jxx, sd = found.absolute("Jxx")[shown], found.sd[shown, 1]
     np.testing.assert_array_equal(values(recorded, "/parameters/Jxx/filter"), jxx)
     np.testing.assert_allclose(values(recorded, "/parameters/Jxx/upper"), jxx + 2 * sd)
     np.testing.assert_allclose(values(recorded, "/parameters/Jxx/lower"), jxx - 2 * sd)
     np.testing.assert_array_equal(
-        values(recorded, "/parameters/mass/til"), other.parameters[shown, 0]
+        values(recorded, "/parameters/mass/til"), other.absolute("mass")[shown]
     )
     assert (values(recorded, "/parameters/mass/truth") == SprungMass().mass).all()
 
@@ -90,8 +91,7 @@ def test_truck_rides_along_its_road(recorded, drive):
 
 
 def test_an_estimate_without_deviations_still_has_its_curve(tmp_path, drive, found):
-    unknown = np.full(found.parameters.shape, np.nan)
-    bare = Estimate(found.velocity, unknown, found.parameters, unknown)
+    bare = replace(found, sd=None)
     path = tmp_path / "bare.rrd"
     write_truck_timeline(path, drive=drive, estimates={"til": bare}, title="bare")
     assert np.isfinite(values(read(path), "/parameters/mass/til")).all()

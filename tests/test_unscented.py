@@ -2,11 +2,16 @@ import numpy as np
 import pytest
 from cars import drive_of_other_car
 
+from estimators.ensemble.unscented import UnscentedObserver
 from estimators.joint.observer import JointObserver, JointSettings
-from estimators.peers.unscented import unscented
 from twin import TwinError, Vehicle
 
 LOAD = {"mass": 200.0, "cm_x": -0.05, "Jzz": 300.0}
+
+
+def observe(observer, drive, speed):
+    observer.reset(speed, road=drive.inputs[0, 9:13])
+    return observer.run(drive)
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +22,7 @@ def rich():
 @pytest.fixture(scope="module")
 def found(rich):
     drive, sd, speed = rich
-    return unscented(Vehicle.load("suv"), drive, sd, tuple(LOAD), speed=speed)
+    return observe(UnscentedObserver(Vehicle.load("suv"), sd, tuple(LOAD)), drive, speed)
 
 
 def errors(estimate):
@@ -47,11 +52,12 @@ def test_car_at_rest_teaches_nothing():
     drive, sd, _ = drive_of_other_car({}, seconds=2.0, snr=10.0)
     still = drive.inputs * 0.0
     still[:, 5:9] = 500.0
-    estimate = unscented(Vehicle.load("suv"), drive.replace(inputs=still), sd, ("mass",), speed=0.0)
+    observer = UnscentedObserver(Vehicle.load("suv"), sd, ("mass",))
+    estimate = observe(observer, drive.replace(inputs=still), 0.0)
     assert (estimate["mass"] == 0.0).all()
 
 
 def test_unknown_parameter_is_refused(rich):
-    drive, sd, speed = rich
+    _, sd, _ = rich
     with pytest.raises(TwinError, match="unscented: parameters are weight; allowed: each at most"):
-        unscented(Vehicle.load("suv"), drive, sd, ("weight",), speed=speed)
+        UnscentedObserver(Vehicle.load("suv"), sd, ("weight",))

@@ -18,14 +18,17 @@ the mass down: it is an open ramp. Only drag keeps a trace of it.
 
 import math
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from estimators.estimate import Estimate
+from estimators.base import Estimate
+from estimators.entry import Entry
+from estimators.priors import initial_deltas
 from estimators.til.state_and_mass import LARGEST_YAW_RATE
 from twin import OUTPUTS, Drive, TwinError
 
@@ -108,40 +111,58 @@ def load(path: Path) -> DoubleTrack:
     return DoubleTrack(**numbers, front=front, rear=rear)
 
 
-def run(car: DoubleTrack, gains: Gains, drive: Drive, speed: float, mass: float) -> Estimate:
-    """Observes a whole drive.
+class DoubleTrackObserver:
+    """The model with its corrections.
 
     Args:
         car: the model.
         gains: of its corrections.
-        drive: with the measurements of a car; NaN corrects nothing.
-        speed: at the start, straight ahead [m/s].
-        mass: what is believed missing at the start [kg].
-
-    Raises:
-        TwinError: the drive has other measurements, or the model has blown up.
     """
-    if drive.output_names != OUTPUTS:
-        raise TwinError(f"drive: has {drive.output_names}, the double track needs {OUTPUTS}")
-    n = len(drive)
-    states, masses, outputs = np.empty((n, 3)), np.empty((n, 1)), np.empty((n, 3))
-    steering = np.ascontiguousarray(drive.channel("steering_wheel_angle"))
-    x = np.array([speed, 0.0, 0.0, mass])
-    done = _run(car, gains, drive.dt, x, steering, drive.measurements, states, masses, outputs)
-    if done < n:
-        raise TwinError(f"drive: the double track blew up at t = {drive.time[done]:.3f} s")
-    return Estimate(
-        time=drive.time,
-        states=states,
-        parameters=masses,
-        outputs=outputs,
-        extended=np.empty((n, 0)),
-        nominal=np.array([car.mass]),
-        state_names=STATES,
-        parameter_names=("mass",),
-        output_names=("ax", "ay", "yaw_rate"),
-        extended_names=(),
-    )
+
+    def __init__(self, car: DoubleTrack, gains: Gains) -> None:
+        self.car, self.gains = car, gains
+        self.reset(0.0)
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """See `estimators.base.Estimator`; the only parameter is the mass, missing [kg]."""
+        (mass,) = initial_deltas(parameters, ("mass",))
+        self._x = np.array([speed, 0.0, 0.0, mass])
+
+    def run(self, drive: Drive) -> Estimate:
+        """Observes a whole drive; a measurement that is NaN corrects nothing.
+
+        Raises:
+            TwinError: the drive has other measurements, or the model has blown up.
+        """
+        if drive.output_names[: len(OUTPUTS)] != OUTPUTS:
+            raise TwinError(f"drive: has {drive.output_names}, the double track needs {OUTPUTS}")
+        n = len(drive)
+        states, masses, outputs = np.empty((n, 3)), np.empty((n, 1)), np.empty((n, 3))
+        steering = np.ascontiguousarray(drive.channel("steering_wheel_angle"))
+        measurements = np.ascontiguousarray(drive.measurements[:, : len(OUTPUTS)])
+        done = _run(
+            self.car, self.gains, drive.dt, self._x, steering, measurements, states, masses, outputs
+        )
+        if done < n:
+            raise TwinError(f"drive: the double track blew up at t = {drive.time[done]:.3f} s")
+        return Estimate(
+            time=drive.time,
+            states=states,
+            parameters=masses,
+            outputs=outputs,
+            extended=np.empty((n, 0)),
+            nominal=np.array([self.car.mass]),
+            state_names=STATES,
+            parameter_names=("mass",),
+            output_names=("ax", "ay", "yaw_rate"),
+            extended_names=(),
+            estimated=("mass",),
+        )
 
 
 @njit(cache=True)
@@ -230,3 +251,13 @@ def _run(car, gains, dt, x, steering, measurements, states, masses, outputs):
         if not (abs(x[0]) < 1e3 and abs(x[1]) < 1e3 and abs(x[2]) < 1e3):
             return k
     return steering.size
+
+
+ENTRY = Entry(
+    name="double-track",
+    words="a planar double-track model under the same corrections, TiL Section 5.2",
+    make=lambda given: DoubleTrackObserver(given.model, given.settings),
+    needs=frozenset(("model", "settings")),
+    channels=OUTPUTS,
+    gives=("mass", "sideslip"),
+)

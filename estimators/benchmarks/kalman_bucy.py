@@ -1,24 +1,33 @@
 """Kalman-Bucy filter for mass, roll and pitch inertia of a truck, KBF with its Jacobian mended.
 
-As printed, KBF Eq. (9) never moves its parameters: see `estimators.kalman_bucy_literal`. Here the
-parameter enters the linearisation, the 6x6 filter falls into three 2x2 ones, and each sample is a
-continuous-discrete Kalman step: R / dt as the variance of a sample, the force averaged over it.
+As printed, KBF Eq. (9) never moves its parameters: see `estimators.benchmarks.kalman_bucy_ode`.
+Here the parameter enters the linearisation, the 6x6 filter falls into three 2x2 ones, and each
+sample is a continuous-discrete Kalman step: R / dt as the variance of a sample, the force averaged
+over it.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from functools import partial
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimators.base import Estimate
 from estimators.benchmarks import kalman_bucy_laws as laws
-from twin import TruckParameters, TwinError
+from estimators.entry import Entry, Given
+from estimators.priors import initial_deltas
+from twin import WHEELS, Drive, TruckParameters, TruckTwin, TwinError
 
 Array = NDArray[np.float64]
 
 LONGEST_SAMPLE_TIME = 0.02  # four samples in a period of the wheel hop (12 Hz) [s]
-_DEFLECTION_CHANNELS = 8
-_RATE_CHANNELS = 3
+# Measured channels: velocities of the chassis, y_02 of KBF Eq. (8), and the suspensions'
+# deflections [m] and their rates [m/s], u_02
+RATES = TruckTwin.outputs
+DEFLECTIONS = tuple(f"{kind}_{w}" for kind in ("deflection", "deflection_rate") for w in WHEELS)
+CHANNELS = (*RATES, *DEFLECTIONS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +47,8 @@ class KalmanBucySettings:
             standard deviations from zero; infinity turns the detection off.
         window: number of innovations.
         inflation: what a load change adds to P_ss, the relative variance of the parameter.
+        gravity: [m/s2]; 0 is the paper's model. Otherwise deflections are counted from the rest at
+            the nominal load, and the filter weighs the load: dv/dt = F / m - g.
     """
 
     parametrisation: Literal["p", "1/p", "log p"] = "1/p"
@@ -50,6 +61,7 @@ class KalmanBucySettings:
     gate: float = np.inf
     window: int = 5
     inflation: float = 0.0
+    gravity: float = 0.0
 
     def __post_init__(self):
         """Refuses values that make no filter."""
@@ -66,7 +78,7 @@ class KalmanBucySettings:
             self.measurement_density,
             "three positive numbers",
         )
-        for name in ("velocity_density", "parameter_density", "inflation"):
+        for name in ("velocity_density", "parameter_density", "inflation", "gravity"):
             _require(0 <= getattr(self, name) < np.inf, name, getattr(self, name), "at least 0")
         _require(
             0 < self.bounds[0] < self.bounds[1] < np.inf,
@@ -125,51 +137,35 @@ def detecting(settings: KalmanBucySettings, *, robust: bool = True) -> KalmanBuc
     return replace(settings, velocity_density=1e-4, parameter_density=0.1, gate=4.0, inflation=0.1)
 
 
-class Estimate(NamedTuple):
-    """Estimates after one sample (shape (3,)) or after each sample of a drive (shape (n, 3)).
-
-    Attributes:
-        velocity: of the chassis [m/s, rad/s, rad/s].
-        velocity_sd: its standard deviation.
-        parameters: mass [kg], roll and pitch inertia [kg m2].
-        parameters_sd: their standard deviation, to first order.
-    """
-
-    velocity: Array
-    velocity_sd: Array
-    parameters: Array
-    parameters_sd: Array
-
-
 class KalmanBucy:
-    """The filter: `update` sample by sample, or `run` over a drive, the same compiled step."""
+    """The filter, sample by sample or over a drive: the same compiled step.
+
+    Args:
+        truck: geometry, springs, dampers and nominal load that the filter assumes.
+        sample_time: [s], above 0 and at most 0.02.
+        settings: tuning.
+
+    Raises:
+        TwinError: the sample time is too long.
+    """
 
     def __init__(
         self,
         truck: TruckParameters,
         sample_time: float,
         settings: KalmanBucySettings | None = None,
-        *,
-        gravity: float = 0.0,
-    ):
-        """Prepares the filter.
-
-        Args:
-            truck: geometry, springs, dampers and nominal load that the filter believes in.
-            sample_time: [s], above 0 and at most 0.02.
-            settings: tuning.
-            gravity: [m/s2]; 0 is the paper's model. Otherwise deflections are counted from the
-                rest at the nominal load, and the filter weighs the load: dv/dt = F / m - g.
-        """
+    ) -> None:
         _require(
             0 < sample_time <= LONGEST_SAMPLE_TIME,
             "sample_time",
             sample_time,
             f"above 0 and at most {LONGEST_SAMPLE_TIME} s, or wheel hop is missed",
         )
+        self.dt = sample_time
         self.settings = settings or KalmanBucySettings()
         self.nominal = truck.nominal.parameters
-        self.law = compile_law(truck, sample_time, self.settings, gravity)
+        self.law = compile_law(truck, sample_time, self.settings)
+        self._default_start = self.law.start.copy()
         self.state = laws.State(
             mean=np.zeros((3, 2)),
             covariance=np.zeros((3, 3)),
@@ -178,56 +174,70 @@ class KalmanBucy:
             samples=np.zeros(1, dtype=np.int64),
         )
 
-    def reset(self) -> None:
-        """Forgets all samples; the next one is the first."""
-        self.state.samples[0] = 0
-
-    def update(self, deflections: ArrayLike, rates: ArrayLike) -> Estimate:
-        """Takes one sample.
+    def reset(
+        self,
+        speed: float = 0.0,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """Forgets all samples; the next one is the first.
 
         Args:
-            deflections: four deflections [m], then four rates [m/s]. Shape (8,).
-            rates: vertical, roll and pitch velocity of the chassis [m/s, rad/s]. Shape (3,).
+            speed: not used.
+            parameters: deltas of the start from nominal; those of the settings if not given.
+            road: not used.
+        """
+        self.state.samples[0] = 0
+        self.law.start[:] = self._default_start
+        if parameters is not None:
+            deltas = initial_deltas(parameters, TruckTwin.parameters)
+            self.law.start[:] = 1.0 + deltas / self.nominal
+
+    def update(self, u: ArrayLike, y: ArrayLike) -> Array:
+        """Takes one sample; returns the parameters' deltas from nominal (3,).
+
+        Args:
+            u: not used.
+            y: measurements in the order of `CHANNELS`. Shape (11,).
 
         Raises:
             TwinError: a channel is missing or not finite.
         """
-        inputs = _channels(deflections, (_DEFLECTION_CHANNELS,), "deflections")
-        measured = _channels(rates, (_RATE_CHANNELS,), "rates")
-        laws.step(self.law, self.state, inputs, measured)
-        return self._estimate(self.state.mean.copy(), self.state.covariance)
+        measured = _checked(y, (len(CHANNELS),), CHANNELS)
+        rates, deflections = measured[: len(RATES)], measured[len(RATES) :]
+        laws.step(self.law, self.state, deflections, rates)
+        rho, _ = _relative(self.law.kind, self.state.mean)
+        return (rho - 1.0) * self.nominal
 
-    def run(self, time: ArrayLike, deflections: ArrayLike, rates: ArrayLike) -> Estimate:
-        """Takes all samples of a drive, from the beginning.
-
-        Args:
-            time: of the samples [s], a sample time apart. Shape (n,).
-            deflections: as in `update`. Shape (n, 8).
-            rates: as in `update`. Shape (n, 3).
+    def run(self, drive: Drive) -> Estimate:
+        """Takes all samples of a drive with `CHANNELS`; the first is the start.
 
         Raises:
             TwinError: a channel or a sample is missing, or a value is not finite.
         """
-        inputs, measured = check_drive(time, deflections, rates, self.law.sample_time)
-        self.reset()
+        inputs, measured = channels(drive, self.law.sample_time)
+        self.state.samples[0] = 0
         n = len(measured)
         means, covariances = np.empty((n, 3, 2)), np.empty((n, 3, 3))
         laws.steps(self.law, self.state, inputs, measured, means, covariances)
-        return self._estimate(means, covariances)
-
-    def _estimate(self, mean: Array, covariance: Array) -> Estimate:
-        return estimate(self.law.kind, self.nominal, mean, covariance)
+        return estimate(self.law.kind, self.nominal, drive.time, means, covariances)
 
 
 def compile_law(
-    truck: TruckParameters, sample_time: float, settings: KalmanBucySettings, gravity: float
+    truck: TruckParameters, sample_time: float, settings: KalmanBucySettings
 ) -> laws.Law:
-    """Puts truck and settings into the constants of the compiled step."""
+    """Puts truck and settings into the constants of the compiled step.
+
+    Args:
+        truck: what the filter assumes.
+        sample_time: [s].
+        settings: tuning.
+    """
     kind = laws.PARAMETRISATIONS[settings.parametrisation]
     start = np.asarray(settings.start, dtype=float)
     slope = np.array([laws.from_state(kind, laws.to_state(kind, rho))[1] for rho in start])
     low, high = sorted(laws.to_state(kind, bound) for bound in settings.bounds)
-    weight = np.array([gravity, 0.0, 0.0])
+    weight = np.array([settings.gravity, 0.0, 0.0])
     return laws.Law(
         kind=kind,
         sample_time=float(sample_time),
@@ -246,50 +256,136 @@ def compile_law(
     )
 
 
-def estimate(kind: int, nominal: Array, mean: Array, covariance: Array) -> Estimate:
-    """Turns axis states (..., 3, 2) and covariances (..., 3, 3) into an estimate."""
+def _relative(kind: int, mean: Array) -> tuple[Array, Array]:
+    """Parameters over their nominal values (..., 3) and their slope over the axis states."""
     s = mean[..., 1]
     if kind == laws.PARAMETRISATIONS["p"]:
-        rho, slope = s, np.ones_like(s)
-    elif kind == laws.PARAMETRISATIONS["1/p"]:
-        rho, slope = 1 / s, 1 / s**2
-    else:
-        rho, slope = np.exp(s), np.exp(s)
+        return s, np.ones_like(s)
+    if kind == laws.PARAMETRISATIONS["1/p"]:
+        return 1 / s, 1 / s**2
+    return np.exp(s), np.exp(s)
+
+
+def estimate(kind: int, nominal: Array, time: Array, mean: Array, covariance: Array) -> Estimate:
+    """Turns axis states and their covariances into an estimate.
+
+    Args:
+        kind: of `laws.PARAMETRISATIONS`.
+        nominal: (3,) mass [kg], roll and pitch inertia [kg m2].
+        time: (n,) [s].
+        mean: (n, 3, 2) velocity and parameter of each axis.
+        covariance: (n, 3, 3) variance, covariance, variance of each axis.
+    """
+    rho, slope = _relative(kind, mean)
     return Estimate(
-        velocity=mean[..., 0],
-        velocity_sd=np.sqrt(covariance[..., 0]),
-        parameters=rho * nominal,
-        parameters_sd=np.sqrt(covariance[..., 2]) * slope * nominal,
+        time=time,
+        states=mean[..., 0],
+        parameters=rho * nominal - nominal,
+        outputs=mean[..., 0],
+        extended=np.empty((time.size, 0)),
+        nominal=nominal,
+        state_names=RATES,
+        parameter_names=TruckTwin.parameters,
+        output_names=RATES,
+        extended_names=(),
+        estimated=TruckTwin.parameters,
+        sd=np.sqrt(covariance[..., 2]) * slope * nominal,
+        states_sd=np.sqrt(covariance[..., 0]),
     )
 
 
-def check_drive(
-    time: ArrayLike, deflections: ArrayLike, rates: ArrayLike, sample_time: float
-) -> tuple[Array, Array]:
-    """Returns deflections and rates as arrays, or says which channel or sample is wrong."""
-    stamps = np.asarray(time, dtype=float)
-    n = len(stamps)
-    inputs = _channels(deflections, (n, _DEFLECTION_CHANNELS), "deflections")
-    measured = _channels(rates, (n, _RATE_CHANNELS), "rates")
-    wrong = np.flatnonzero(~(np.abs(np.diff(stamps) - sample_time) <= 0.01 * sample_time))
+def channels(drive: Drive, sample_time: float) -> tuple[Array, Array]:
+    """Deflections (n, 8) and rates (n, 3) of a drive.
+
+    Args:
+        drive: with `CHANNELS`.
+        sample_time: that the filter was made for [s].
+
+    Raises:
+        TwinError: a channel or a sample is missing, or a value is not finite.
+    """
+    deflections, rates = (
+        _checked(np.column_stack([drive.channel(name) for name in names]), None, names)
+        for names in (DEFLECTIONS, RATES)
+    )
+    wrong = np.flatnonzero(~(np.abs(np.diff(drive.time) - sample_time) <= 0.01 * sample_time))
     if wrong.size:
         raise TwinError(
-            f"Kalman-Bucy time: {stamps[wrong[0] + 1]} s follows {stamps[wrong[0]]} s; samples "
-            f"must be {sample_time} s apart"
+            f"Kalman-Bucy time: {drive.time[wrong[0] + 1]} s follows {drive.time[wrong[0]]} s; "
+            f"samples must be {sample_time} s apart"
         )
-    return inputs, measured
+    return deflections, rates
 
 
-def _channels(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+def _checked(values: ArrayLike, shape: tuple[int, ...] | None, names: tuple[str, ...]) -> Array:
     array = np.ascontiguousarray(values, dtype=float)
-    if array.shape != shape:
-        raise TwinError(f"Kalman-Bucy {name}: shape {array.shape}, must be {shape}")
+    if shape is not None and array.shape != shape:
+        raise TwinError(f"Kalman-Bucy measurements: shape {array.shape}, must be {shape}")
     if not np.isfinite(array).all():
-        at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise TwinError(f"Kalman-Bucy {name}: {array[at]} at index {at}, must be finite")
+        *row, column = np.argwhere(~np.isfinite(array))[0].tolist()
+        where = f" in sample {row[0]}" if row else ""
+        raise TwinError(
+            f"Kalman-Bucy {names[column]}: {array[(*row, column)]}{where}, must be finite"
+        )
     return array
 
 
 def _require(condition: bool, name: str, value: object, allowed: str) -> None:
     if not condition:
         raise TwinError(f"Kalman-Bucy {name}: {value}, must be {allowed}")
+
+
+def _filter(given: Given, settings: Callable[[Given], KalmanBucySettings]) -> KalmanBucy:
+    if given.dt is None:
+        raise TwinError("Kalman-Bucy: has no sample time; allowed: with dt")
+    return KalmanBucy(given.model, given.dt, given.settings or settings(given))
+
+
+def _matched(given: Given) -> KalmanBucySettings:
+    sd = given.noise(RATES)
+    return matched((sd[0], sd[1], sd[2]), given.dt or 0.0)
+
+
+def _entry(
+    name: str, words: str, settings: Callable[[Given], KalmanBucySettings], *needs: str
+) -> Entry:
+    return Entry(
+        name=name,
+        words=words,
+        make=partial(_filter, settings=settings),
+        needs=frozenset(("model", "dt", *needs)),
+        channels=CHANNELS,
+        gives=(*TruckTwin.parameters, *RATES),
+        sd=True,
+        online=True,
+    )
+
+
+_PAPER = "the Kalman-Bucy filter of the truck with the paper's noise"
+_MATCHED = "the Kalman-Bucy filter of the truck with the sensors' noise"
+ENTRIES = (
+    _entry("kalman-bucy", _PAPER, lambda _: KalmanBucySettings()),
+    _entry(
+        "kalman-bucy-p",
+        f"{_PAPER}, p as its state",
+        lambda _: KalmanBucySettings(parametrisation="p"),
+    ),
+    _entry(
+        "kalman-bucy-log",
+        f"{_PAPER}, log p as its state",
+        lambda _: KalmanBucySettings(parametrisation="log p"),
+    ),
+    _entry("kalman-bucy-matched", _MATCHED, _matched, "noise_sd"),
+    _entry(
+        "kalman-bucy-detecting",
+        f"{_MATCHED}, detecting load changes",
+        lambda given: detecting(_matched(given)),
+        "noise_sd",
+    ),
+    _entry(
+        "kalman-bucy-sharp",
+        f"{_MATCHED}, detecting load changes without room for model error",
+        lambda given: detecting(_matched(given), robust=False),
+        "noise_sd",
+    ),
+)

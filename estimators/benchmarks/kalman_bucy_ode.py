@@ -4,98 +4,91 @@ With the Jacobian of the parameters it is the reference for the fast filter; wit
 filter as printed: A_02 = 0, so the parameter rows of the gain stay exactly zero.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from estimators.base import Estimate
 from estimators.benchmarks import kalman_bucy_laws as laws
 from estimators.benchmarks.kalman_bucy import (
-    Estimate,
+    CHANNELS,
+    RATES,
     KalmanBucySettings,
-    check_drive,
+    channels,
     compile_law,
     estimate,
 )
-from twin import TruckParameters, TwinError
+from estimators.entry import Entry, Given
+from twin import Drive, TruckParameters, TruckTwin, TwinError
 
 Array = NDArray[np.float64]
 
 RK4_LIMIT = 2.785  # |lambda dt| up to which RK4 is stable on the negative real axis
 
 
-def run_riccati(
-    truck: TruckParameters,
-    sample_time: float,
-    settings: KalmanBucySettings,
-    time: ArrayLike,
-    deflections: ArrayLike,
-    rates: ArrayLike,
-    *,
-    gravity: float = 0.0,
-) -> Estimate:
-    """Runs the Kalman-Bucy filter with its Jacobian as a differential equation over a drive.
+class KalmanBucyOde:
+    """The Kalman-Bucy filter as a differential equation; signals are linear between samples.
 
-    Signals are linear between the samples. The detection of load changes and the bounds of the
-    settings do not apply.
+    The detection of load changes and the bounds of the settings do not apply.
 
     Args:
-        truck: what the filter believes in.
+        truck: what the filter assumes.
         sample_time: [s], also the step of RK4.
         settings: tuning.
-        time: [s]. Shape (n,).
-        deflections: four deflections [m], then four rates [m/s]. Shape (n, 8).
-        rates: vertical, roll and pitch velocity [m/s, rad/s, rad/s]. Shape (n, 3).
-        gravity: as in `KalmanBucy`.
+        literal: whether the filter is as KBF Eqs. (8)-(9) print it: its parameters never leave
+            their start. The state holds p / p_nominal instead of p, which changes units only.
 
     Raises:
-        TwinError: bad input, or a step size at which RK4 is unstable.
+        TwinError: a literal filter of another parametrisation than p.
     """
-    law = compile_law(truck, sample_time, settings, gravity)
-    return _run(law, truck, time, deflections, rates, True)
 
+    def __init__(
+        self,
+        truck: TruckParameters,
+        sample_time: float,
+        settings: KalmanBucySettings,
+        *,
+        literal: bool = False,
+    ) -> None:
+        if literal and settings.parametrisation != "p":
+            raise TwinError(
+                f"literal filter parametrisation: {settings.parametrisation!r}, must be 'p'"
+            )
+        self.dt = sample_time
+        self.nominal = truck.nominal.parameters
+        self._law, self._literal = compile_law(truck, sample_time, settings), literal
 
-def run_literal(
-    truck: TruckParameters,
-    sample_time: float,
-    settings: KalmanBucySettings,
-    time: ArrayLike,
-    deflections: ArrayLike,
-    rates: ArrayLike,
-) -> Estimate:
-    """Runs the filter as KBF Eqs. (8)-(9) print it; its parameters never leave their start.
+    def reset(
+        self,
+        speed: float = 0.0,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """Nothing to reset: a drive begins at its first sample, with the settings' parameters."""
 
-    Arguments and errors are those of `run_riccati`; gravity is unknown to it. The state holds
-    p / p_nominal instead of p, which changes units only.
-    """
-    if settings.parametrisation != "p":
-        raise TwinError(
-            f"literal filter parametrisation: {settings.parametrisation!r}, must be 'p'"
-        )
-    law = compile_law(truck, sample_time, settings, 0.0)
-    return _run(law, truck, time, deflections, rates, False)
+    def run(self, drive: Drive) -> Estimate:
+        """Filters a whole drive.
 
-
-def _run(law, truck, time, deflections, rates, with_jacobian: bool) -> Estimate:
-    inputs, measured = check_drive(time, deflections, rates, law.sample_time)
-    n = len(measured)
-    states, covariances = np.empty((n, 6)), np.empty((n, 6, 6))
-    done = _integrate(law, inputs, measured, with_jacobian, states, covariances)
-    if done < n:
-        raise TwinError(
-            f"Kalman-Bucy sample_time: {law.sample_time} s is unstable for the Riccati equation "
-            f"at sample {done}; must keep P dt / R below {RK4_LIMIT}"
-        )
-    axis = np.arange(3)
-    mean = np.stack([states[:, :3], states[:, 3:]], axis=-1)
-    cov = np.stack(
-        [
-            covariances[:, axis, axis],
-            covariances[:, axis, axis + 3],
-            covariances[:, axis + 3, axis + 3],
-        ],
-        axis=-1,
-    )
-    return estimate(law.kind, truck.nominal.parameters, mean, cov)
+        Raises:
+            TwinError: bad input, or a step size at which RK4 is unstable.
+        """
+        law = self._law
+        inputs, measured = channels(drive, law.sample_time)
+        n = len(measured)
+        states, covariances = np.empty((n, 6)), np.empty((n, 6, 6))
+        done = _integrate(law, inputs, measured, not self._literal, states, covariances)
+        if done < n:
+            raise TwinError(
+                f"Kalman-Bucy sample_time: {law.sample_time} s is unstable for the Riccati "
+                f"equation at sample {done}; must keep P dt / R below {RK4_LIMIT}"
+            )
+        axis = np.arange(3)
+        mean = np.stack([states[:, :3], states[:, 3:]], axis=-1)
+        pairs = ((axis, axis), (axis, axis + 3), (axis + 3, axis + 3))
+        covariance = np.stack([covariances[:, i, k] for i, k in pairs], axis=-1)
+        return estimate(law.kind, self.nominal, drive.time, mean, covariance)
 
 
 @njit(cache=True, nogil=True)
@@ -150,3 +143,21 @@ def _integrate(law, with_inputs, measured, with_jacobian, states, covariances):
                 return k
         states[k], covariances[k] = x, p
     return len(measured)
+
+
+def _make_literal(given: Given) -> KalmanBucyOde:
+    if given.dt is None:
+        raise TwinError("Kalman-Bucy: has no sample time; allowed: with dt")
+    settings = given.settings or KalmanBucySettings(parametrisation="p")
+    return KalmanBucyOde(given.model, given.dt, settings, literal=True)
+
+
+ENTRY = Entry(
+    name="kalman-bucy-literal",
+    words="the Kalman-Bucy filter of the truck as the paper prints it",
+    make=_make_literal,
+    needs=frozenset(("model", "dt")),
+    channels=CHANNELS,
+    gives=(*TruckTwin.parameters, *RATES),
+    sd=True,
+)

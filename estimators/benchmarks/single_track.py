@@ -9,12 +9,15 @@ Its numbers are fitted to a measured sideslip by bounded least squares.
 """
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from estimators.base import Estimate, sideslip_estimate
+from estimators.entry import Entry
 from twin import Drive
 
 Array = NDArray[np.float64]
@@ -30,6 +33,7 @@ class Geometry(NamedTuple):
     front: float  # from the centre of mass to the front axle [m]
     rear: float  # ... to the rear axle [m]
     yaw_inertia: float  # [kg m2]
+    steering_ratio: float = 1.0  # hand wheel over front wheels
 
 
 class SingleTrack(NamedTuple):
@@ -91,6 +95,38 @@ def fit(
     return SingleTrack(*found.x.tolist())
 
 
+class SingleTrackEstimator:
+    """A fitted single-track car over a drive with steering_wheel_angle, yaw_rate and vx.
+
+    Args:
+        car: its fitted numbers.
+        geometry: what is known of it.
+    """
+
+    def __init__(self, car: SingleTrack, geometry: Geometry) -> None:
+        self.car, self.geometry = car, geometry
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """Nothing to reset: each drive begins straight ahead at its first yaw rate."""
+
+    def run(self, drive: Drive) -> Estimate:
+        """Sideslip over a whole drive.
+
+        Raises:
+            TwinError: the drive lacks a channel.
+        """
+        steering = drive.channel("steering_wheel_angle") / self.geometry.steering_ratio
+        speed = drive.channel("vx")
+        return sideslip_estimate(
+            drive.time, predict(self.car, self.geometry, steering, drive, speed)
+        )
+
+
 @njit(cache=True)
 def _force(alpha, stiffness, friction, load):
     peak = friction * load
@@ -120,3 +156,13 @@ def _run(car, geometry, dt, steering, yaw_rate, speed, sideslip):
         moment = geometry.front * front - geometry.rear * rear
         vy += dt * ((front + rear) / geometry.mass - v * r + car.lateral_gain * innovation)
         r += dt * (moment / geometry.yaw_inertia + car.yaw_gain * innovation)
+
+
+ENTRY = Entry(
+    name="single-track",
+    words="sideslip by a fitted single-track car that follows the measured yaw rate",
+    make=lambda given: SingleTrackEstimator(*given.model),
+    needs=frozenset(("model",)),
+    channels=("yaw_rate", "vx"),
+    gives=("sideslip",),
+)

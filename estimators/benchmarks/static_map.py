@@ -5,13 +5,19 @@ circle and slips by the force that it carries. The map beta = k_1 a_y + k_2 r / 
 two terms and an offset, fitted to a measured sideslip.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import signal
 
+from estimators.base import Estimate, sideslip_estimate
+from estimators.entry import Entry
+from twin import Drive
+
 Array = NDArray[np.float64]
+LEAST_SPEED = 1.0  # of the signal that stands for the speed; chosen
 
 
 class StaticMap(NamedTuple):
@@ -52,3 +58,57 @@ def low_pass(values: Array, dt: float, cutoff: float = 2.0) -> Array:
         cutoff: [Hz]; 2 Hz: above the driver, below the engine and wheel hop.
     """
     return signal.sosfiltfilt(signal.butter(2, cutoff, fs=1.0 / dt, output="sos"), values)
+
+
+class StaticMapEstimator:
+    """A static map over the low-passed signals of a drive.
+
+    Args:
+        static_map: fitted to `map_inputs` of another drive.
+    """
+
+    def __init__(self, static_map: StaticMap) -> None:
+        self.static_map = static_map
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """Nothing to reset: the map has no memory."""
+
+    def run(self, drive: Drive) -> Estimate:
+        """Sideslip over a whole drive.
+
+        Raises:
+            TwinError: the drive lacks a channel.
+        """
+        return sideslip_estimate(drive.time, predict(self.static_map, *map_inputs(drive)))
+
+
+def map_inputs(drive: Drive) -> tuple[Array, Array, Array]:
+    """Lateral acceleration, yaw rate and speed of a drive, low-passed, as `fit` takes them.
+
+    The speed is the measured `vx` where there is one, else the mean of the rear wheel speeds.
+
+    Raises:
+        TwinError: the drive lacks a channel.
+    """
+    if "vx" in drive.output_names:
+        speed = drive.channel("vx")
+    else:
+        speed = 0.5 * (drive.channel("wheel_speed_rl") + drive.channel("wheel_speed_rr"))
+    signals = drive.channel("ay"), drive.channel("yaw_rate"), speed
+    ay, yaw_rate, speed = (low_pass(signal, drive.dt) for signal in signals)
+    return ay, yaw_rate, np.maximum(speed, LEAST_SPEED)
+
+
+ENTRY = Entry(
+    name="static-map",
+    words="sideslip by a linear map of lateral acceleration and curvature",
+    make=lambda given: StaticMapEstimator(given.model),
+    needs=frozenset(("model",)),
+    channels=("ay", "yaw_rate"),
+    gives=("sideslip",),
+)

@@ -4,16 +4,19 @@ See `estimators.joint.kernel` for the method, and `JointSettings` for what can b
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimators.base import Estimate
+from estimators.black_box import settle
 from estimators.drive_channels import check_measurements, given_by
-from estimators.estimate import Estimate
+from estimators.entry import Entry, Given
 from estimators.joint import kernel as joint_kernel
 from estimators.joint.state import RING, Log, Memory, Setup
+from estimators.priors import OFFSETS, PRIOR_SD, initial_deltas
 from twin import (
     LOAD,
     OUTPUTS,
@@ -32,32 +35,11 @@ Array = NDArray[np.float64]
 # What is estimated of the sensors: biases of the IMU, the delay of all signals, the IMU's position
 # beside where the twin has it; and by how much the twins' speed is off. None of them needs a twin.
 FAULTS = (*(f"bias_{name}" for name in OUTPUTS[:6]), "delay", "imu_x", "imu_y", "imu_z", "speed")
-# Standard deviations before the first sample: a full car more or less, its CM anywhere between the
-# seats, and a model of tyres and springs from a data sheet
-PRIOR_SD = {
-    "mass": 300.0,
-    **{"cm_x": 0.08, "cm_y": 0.04, "cm_z": 0.06},
-    **{"Jxx": 150.0, "Jyy": 900.0, "Jzz": 900.0},
-    **{"Jxy": 30.0, "Jxz": 80.0, "Jyz": 30.0},
-    **dict.fromkeys(SCALES, 0.15),
-    **dict.fromkeys(("drag", "relaxation"), 0.3),
-    **dict.fromkeys(("drive_torque", "brake_torque"), 0.03),
-}
 # A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m, m/s]
 FAULT_SD = dict(
     zip(FAULTS, (0.1, 0.1, 0.1, 0.005, 0.005, 0.005, 0.01, 0.07, 0.07, 0.07, 0.1), strict=True)
 )
 SPEED_DRIFT = 0.0003  # of the twins' speed, what no parameter explains [m/s per root of a second]
-# How far each twin is off: as in `estimators.identifiability.cramer_rao`, large beside rounding,
-# small beside curvature
-OFFSETS = {
-    "mass": 10.0,
-    **dict.fromkeys(("cm_x", "cm_y", "cm_z"), 0.005),
-    **{"Jxx": 10.0, "Jyy": 30.0, "Jzz": 30.0},
-    **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 10.0),
-    **dict.fromkeys(SCALES, 0.01),
-    "drag": 0.05,
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,28 +102,27 @@ class JointSettings:
     least_excitation: float = 0.02
 
 
+def _none() -> Any:
+    raise TwinError("joint: an estimate needs sd and valid")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointEstimate(Estimate):
     """A run of the joint observer.
 
     Attributes:
-        estimated: p names of what was estimated, in the order of `covariance`; faults follow.
         prior: (p + b,) standard deviations before the first sample.
-        sd: (N, p + b) standard deviation of each estimate.
-        valid: (N, p + b) whether the drive has told it.
-        changes: (N,) of the load that were found until then.
-        faults: (N, b) of the sensors, in the order of `JointSettings.faults`.
+        sd: (N, p + b) standard deviation of each of `estimated`.
+        valid: (N, p + b) whether it is identified.
+        changes: (N,) changes of the load that were found until then.
         covariance: (p + b, p + b) at the end.
         information: (p + b, p + b) Fisher's, of all that was used.
     """
 
-    estimated: tuple[str, ...]
-    fault_names: tuple[str, ...]
     prior: Array
-    sd: Array
-    valid: NDArray[np.bool_]
+    sd: Array = field(default_factory=_none)  # narrows the type
+    valid: NDArray[np.bool_] = field(default_factory=_none)
     changes: NDArray[np.int64]
-    faults: Array
     covariance: Array
     information: Array
 
@@ -238,24 +219,19 @@ class JointObserver:
         self,
         speed: float,
         parameters: Mapping[str, float] | None = None,
-        road: ArrayLike = (0.0, 0.0, 0.0, 0.0),
+        road: ArrayLike | None = None,
     ) -> None:
         """Starts anew: the twins settle at a speed, each with its own parameters.
 
         Args:
             speed: [m/s].
-            parameters: deltas from the nominal vehicle by name; zero where not given.
-            road: (4,) height under each wheel [m].
+            parameters: initial deltas from the nominal values by name; zero where not given.
+            road: (4,) height under each wheel [m]; zero if not given.
         """
         memory = self._memory
         for array in memory:
             array[:] = 0
-        for name, value in (parameters or {}).items():
-            if name not in PARAMETERS:
-                raise TwinError(
-                    f"joint: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
-                )
-            memory.theta[PARAMETERS.index(name)] = value
+        memory.theta[:] = initial_deltas(parameters)
         memory.estimate[:] = memory.theta
         memory.z[: self._setup.parameter.size] = memory.theta[self._setup.parameter]
         memory.covariance[:] = np.diag(self._prior**2)
@@ -265,7 +241,7 @@ class JointObserver:
             if i > 0:
                 p[self._setup.parameter[i - 1]] += self._setup.offset[i - 1]
             twin.set_parameters(p)
-            twin.reset(speed, road)
+            settle(twin, speed, road)
 
     @property
     def covariance(self) -> Array:
@@ -347,12 +323,12 @@ class JointObserver:
             extended=log.extended.reshape(n, -1),
             nominal=self._setup.nominal.copy(),
             estimated=self.estimated,
-            fault_names=self.settings.faults,
+            sensor_error_names=self.settings.faults,
             prior=self._prior.copy(),
             sd=log.sd,
             valid=log.sd < self.settings.valid_share * self._prior,
             changes=log.changes,
-            faults=log.faults,
+            sensor_errors=log.faults,
             covariance=self._memory.covariance.copy(),
             information=self._memory.information.copy(),
         )
@@ -378,3 +354,24 @@ def _check(settings: JointSettings, noise_sd: Array) -> None:
             f"joint: noise_sd is {noise_sd.tolist()}; allowed: {len(OUTPUTS)} numbers above zero, "
             "NaN for a channel that is not used"
         )
+
+
+def _make(given: Given) -> JointObserver:
+    settings = given.settings or JointSettings()
+    if given.parameters is not None:
+        settings = replace(settings, parameters=given.parameters)
+    if given.prior_sd:
+        settings = replace(settings, prior_sd={**settings.prior_sd, **given.prior_sd})
+    return JointObserver(given.car(), given.noise(OUTPUTS), settings)
+
+
+ENTRY = Entry(
+    name="joint",
+    words="a Kalman filter over all parameters at once, by twins that differ in one each",
+    make=_make,
+    needs=frozenset(("twin", "noise_sd")),
+    channels=OUTPUTS,
+    gives=(*LOAD, *SCALES, *FAULTS, "sideslip"),
+    sd=True,
+    online=True,
+)

@@ -17,11 +17,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from estimators.black_box import BlackBox
-from estimators.drive_channels import Given, check_measurements, given_by
-from estimators.estimate import Estimate
+from estimators.base import Estimate
+from estimators.black_box import BlackBox, settle
+from estimators.drive_channels import DriveChannels, check_measurements, given_by
+from estimators.entry import Entry, Given
+from estimators.priors import initial_deltas
 from estimators.speed_follower import SpeedFollower, check_follower, follow
-from estimators.til.gains import compile_gains, place_of
+from estimators.til.gains import compile_gains
 from estimators.til.law import (
     BEGUN,
     JUMPED,
@@ -39,7 +41,7 @@ from estimators.til.measurement_validation import (
     new_watch,
     renew,
 )
-from twin import Drive, Twin, TwinError, check_inputs
+from twin import PARAMETERS, Drive, Twin, TwinError, check_inputs
 from twin.kernel import correct, is_sound, read_states, set_parameters, step
 
 Array = NDArray[np.float64]
@@ -115,19 +117,23 @@ class Observer:
         )
         self._fresh = memory.copy()
 
-    def reset(self, speed: float, parameters: Mapping[str, float] | None = None) -> None:
-        """Starts anew: the twin settles at a speed, believing in some load.
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """Starts anew: the twin settles at a speed, under some load.
 
         Args:
             speed: [m/s].
-            parameters: deltas from the nominal chassis by name; zero where not given.
+            parameters: initial deltas from the nominal values by name; zero where not given.
+            road: (4,) height under each wheel [m]; zero if not given.
         """
-        p = np.zeros(len(self.twin.parameters))
-        for name, value in (parameters or {}).items():
-            p[place_of(name, self.twin.parameters, "parameter")] = value
+        p = initial_deltas(parameters, self.twin.parameters)
         self._memory.laws[:] = self._fresh
         self._memory.p[:] = self.twin.set_parameters(p)
-        self._settle(speed)
+        self._settle(speed, road)
 
     def restart(self, speed: float) -> None:
         """Goes on at another place, after a gap: what is known of the parameters stays.
@@ -138,11 +144,11 @@ class Observer:
         self._memory.laws[:, BEGUN:] = self._fresh[:, BEGUN:]
         self._settle(speed)
 
-    def _settle(self, speed: float) -> None:
+    def _settle(self, speed: float, road: ArrayLike | None = None) -> None:
         self._memory.sample[:] = 0
         renew(self._memory.watch)
         self.distrust()
-        self.twin.reset(speed)
+        settle(self.twin, speed, road)
 
     def distrust(self) -> None:
         """Says that something else was wrong: estimates have to settle again."""
@@ -214,7 +220,7 @@ class Observer:
             return self._run_compiled(self.twin, drive, given)
         return self._run_black_box(drive, given)
 
-    def _run_compiled(self, twin: Twin, drive: Drive, given: Given) -> Estimate:
+    def _run_compiled(self, twin: Twin, drive: Drive, given: DriveChannels) -> Estimate:
         check_inputs(given.inputs, "drive")
         n = len(drive)
         states, parameters, outputs = _histories(twin, n)
@@ -240,7 +246,7 @@ class Observer:
             trustworthy=trustworthy,
         )
 
-    def _run_black_box(self, drive: Drive, given: Given) -> Estimate:
+    def _run_black_box(self, drive: Drive, given: DriveChannels) -> Estimate:
         twin = self.twin
         states, parameters, outputs = _histories(twin, len(drive))
         trustworthy = np.empty(len(drive), dtype=np.bool_)
@@ -379,3 +385,42 @@ def _histories(twin: BlackBox, n: int) -> tuple[Array, Array, Array]:
         np.empty((n, len(names))) for names in (twin.states, twin.parameters, twin.outputs)
     )
     return states, parameters, outputs
+
+
+def _make(given: Given) -> Observer:
+    return Observer(
+        given.twin(), given.laws, given.gains, every=given.every, guarded=given.validated,
+        follower=given.follower,
+    )  # fmt: skip
+
+
+def _make_open_loop(given: Given) -> Observer:
+    return Observer(given.twin(), [], follower=given.follower)
+
+
+ENTRIES = (
+    Entry(
+        name="til",
+        words="the Twin-in-the-Loop observer, its laws by least squares",
+        make=_make,
+        needs=frozenset(("twin",)),
+        gives=(*PARAMETERS, "sideslip"),
+        online=True,
+    ),
+    Entry(
+        name="til-paper",
+        words="the Twin-in-the-Loop observer with the laws as the paper has them",
+        make=_make,
+        needs=frozenset(("twin", "laws")),
+        gives=(*PARAMETERS, "sideslip"),
+        online=True,
+    ),
+    Entry(
+        name="zero",
+        words="the twin alone, without any correction",
+        make=_make_open_loop,
+        needs=frozenset(("twin",)),
+        gives=("sideslip",),
+        online=True,
+    ),
+)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.estimate import Estimate
+from estimators.base import Estimate
 from estimators.speed_follower import SpeedFollower
 from estimators.til.observer import Observer
 from scenarios.calibration.free_parameters import FREE, Kind

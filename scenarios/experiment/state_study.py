@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.base import Estimate
 from estimators.benchmarks import double_track, static_map
-from estimators.estimate import Estimate
 from estimators.til import state_and_mass
 from estimators.til.observer import Observer
 from scenarios.driving.drivers import DRIVERS, LIMITS
@@ -152,8 +152,9 @@ def observe(run: Run) -> tuple[Drive, Belief]:
     if run.estimator == "double-track":
         values = double_track.Gains(**_values(run, car, run.estimator))
         model = double_track.load(double_track_fit.path(car))
-        speed = float(drive.truth["vx"][0])
-        found = double_track.run(model, values, drive, speed, run.start)
+        benchmark = double_track.DoubleTrackObserver(model, values)
+        benchmark.reset(float(drive.truth["vx"][0]), {"mass": run.start})
+        found = benchmark.run(drive)
         return drive, _belief(found, drive, _missing(drive, car))
     observer = make_observer(run)
     observer.reset(float(drive.truth["vx"][0]), {"mass": run.start})
@@ -216,7 +217,7 @@ def _belief(found: Estimate, drive: Drive, missing: float) -> Belief:
     else:
         forces = np.full((len(drive), 2), np.nan)
     return Belief(
-        sideslip=np.arctan2(found["vy"], np.maximum(found["vx"], 1e-3)),
+        sideslip=found.sideslip,
         mass=found["mass"] - missing,
         axle_force=forces,
         estimate=found,

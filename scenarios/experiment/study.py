@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from estimators.estimate import Estimate
+from estimators.base import Estimate
 from estimators.score import rms_pct, settling_time
 from estimators.til.law import ParameterLaw
 from estimators.til.observer import Observer

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.estimate import Estimate
+from estimators.base import Estimate
 from estimators.joint.observer import JointObserver, JointSettings
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.parameter_estimate import ParameterEstimate
 from scenarios.experiment.joint import NAMES, Run, clean_drive, truth, units
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Row
@@ -33,7 +32,7 @@ def score(peer: str, run: Run) -> PeerScore:
     sd = [drive.settings["noise_sd"][name] for name in OUTPUTS]
     estimate = PEERS[peer](Vehicle.load(TWIN), drive, sd, float(clean.truth["vx"][0]))
     off = estimate.parameters[-1, : len(NAMES)] - truth(drive)[-1]
-    if isinstance(estimate, ParameterEstimate):
+    if estimate.sd is not None:
         names = estimate.estimated
         claimed = dict(zip(names, estimate.sd[-1].tolist(), strict=True))
     else:

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 
 from numpy.typing import ArrayLike
 
-from estimators.estimate import Estimate
-from estimators.peers.offline_fit import offline_fit
-from estimators.peers.staged import staged
-from estimators.peers.unscented import unscented
+from estimators.base import Estimate
+from estimators.ensemble.offline_fit import OfflineFit
+from estimators.ensemble.staged import StagedObserver
+from estimators.ensemble.unscented import UnscentedObserver
 from estimators.til.law import ParameterLaw
 from estimators.til.observer import Observer
 from scenarios import mass, pitch, roll_yaw
@@ -41,7 +41,9 @@ PAPER_LAWS = tuple(
 
 
 def _staged(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return staged(vehicle, drive, noise_sd, STAGED_LAWS, speed=speed)
+    observer = StagedObserver(vehicle, noise_sd, STAGED_LAWS)
+    observer.reset(speed, road=drive.inputs[0, 9:13])
+    return observer.run(drive)
 
 
 def _paper(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
@@ -52,11 +54,15 @@ def _paper(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) ->
 
 
 def _unscented(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return unscented(vehicle, drive, noise_sd, NAMES, speed=speed)
+    observer = UnscentedObserver(vehicle, noise_sd, NAMES)
+    observer.reset(speed, road=drive.inputs[0, 9:13])
+    return observer.run(drive)
 
 
 def _least_squares(vehicle: Vehicle, drive: Drive, noise_sd: ArrayLike, speed: float) -> Estimate:
-    return offline_fit(vehicle, drive, noise_sd, NAMES, speed=speed)
+    fit = OfflineFit(vehicle, noise_sd, NAMES)
+    fit.reset(speed, road=drive.inputs[0, 9:13])
+    return fit.run(drive)
 
 
 NAMES = (*LOAD, *SCALES)

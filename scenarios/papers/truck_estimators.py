@@ -6,19 +6,19 @@ from functools import partial
 
 import numpy as np
 
+from estimators.base import Estimate
 from estimators.benchmarks.kalman_bucy import (
-    Estimate,
     KalmanBucy,
     KalmanBucySettings,
     detecting,
     matched,
 )
-from estimators.benchmarks.kalman_bucy_ode import run_literal
+from estimators.benchmarks.kalman_bucy_ode import KalmanBucyOde
 from estimators.til.law import ParameterLaw
 from estimators.til.observer import Observer
 from scenarios.papers.truck_drive import NOISE, SAMPLE_TIME, TruckCase
 from twin import Drive, TruckParameters, TruckTwin
-from twin.truck.model import DEFLECTIONS, RATES
+from twin.truck.model import RATES
 
 Estimator = Callable[[TruckCase, Drive], Estimate]
 SettingsOf = Callable[[TruckCase], KalmanBucySettings]
@@ -42,16 +42,16 @@ def kalman_bucy(
     case: TruckCase, drive: Drive, *, settings: KalmanBucySettings | SettingsOf
 ) -> Estimate:
     """The corrected filter, with its settings or what gives them for a case."""
-    tuning = settings(case) if callable(settings) else settings
-    observer = KalmanBucy(TruckParameters(), SAMPLE_TIME, tuning, gravity=known_gravity(case))
-    return observer.run(drive.time, channels(drive, DEFLECTIONS), channels(drive, RATES))
+    tuning = replace(
+        settings(case) if callable(settings) else settings, gravity=known_gravity(case)
+    )
+    return KalmanBucy(TruckParameters(), SAMPLE_TIME, tuning).run(drive)
 
 
 def literal(case: TruckCase, drive: Drive) -> Estimate:
     """The filter as printed; the case tells it nothing."""
     settings = KalmanBucySettings(parametrisation="p")
-    deflections, rates = channels(drive, DEFLECTIONS), channels(drive, RATES)
-    return run_literal(TruckParameters(), SAMPLE_TIME, settings, drive.time, deflections, rates)
+    return KalmanBucyOde(TruckParameters(), SAMPLE_TIME, settings, literal=True).run(drive)
 
 
 def matched_settings(case: TruckCase) -> KalmanBucySettings:
@@ -99,7 +99,7 @@ def til(case: TruckCase, drive: Drive) -> Estimate:
 
     Its twin, a simulator of the whole truck, is driven by the road heights under the real wheels,
     without error: more than a real truck knows. It sees the three rates, but no suspension; the
-    filters see both and know no road. Standard deviations, which it does not give, are NaN.
+    filters see both and know no road.
 
     The laws know no weight: under gravity a twin whose mass they raise sinks, which they take for
     the answer of a mass still too small. Only a twin without gravity finds the mass there.
@@ -109,14 +109,7 @@ def til(case: TruckCase, drive: Drive) -> Estimate:
     observer = Observer(twin, TIL_LAWS, TIL_GAINS)
     observer.reset(0.0, start)
     seen = drive.replace(measurements=channels(drive, RATES), output_names=RATES)
-    found = observer.run(seen)
-    unknown = np.full(found.outputs.shape, np.nan)
-    return Estimate(
-        velocity=found.outputs,
-        velocity_sd=unknown,
-        parameters=twin.nominal + found.parameters,
-        parameters_sd=unknown,
-    )
+    return replace(observer.run(seen), nominal=twin.nominal)
 
 
 def _filter(settings: KalmanBucySettings | SettingsOf) -> Estimator:

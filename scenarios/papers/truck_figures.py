@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from estimators.benchmarks.kalman_bucy import Estimate
+from estimators.base import Estimate
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Result, Row
 from scenarios.papers.truck_drive import LOAD_STEPS, TruckCase, make_drive
 from scenarios.papers.truck_estimators import ESTIMATORS, some
-from scenarios.papers.truck_score import PAPER, UNITS, run_cases, settling_times
+from scenarios.papers.truck_score import PAPER, UNITS, absolute, run_cases, settling_times
 from scenarios.report import pictures
 from twin import Drive
 from twin.truck.model import RATES
@@ -41,7 +41,7 @@ def figure_5(seeds: int, jobs: int, out: Path) -> Result:
         title="KBF Figure 5: the chassis' velocities",
     ) as axes:
         for i, (ax, name) in enumerate(zip(axes, RATES, strict=True)):
-            columns = {own: found.velocity[:, i] for own, found in estimates.items()}
+            columns = {own: found.outputs[:, i] for own, found in estimates.items()}
             _draw(ax, drive, name, columns)
         axes[0].legend(ncols=3, fontsize="small")
         axes[-1].set(xlabel="time [s]")
@@ -68,8 +68,8 @@ def figure_6(seeds: int, jobs: int, out: Path) -> Result:
     with pictures.figure(
         out / "kbf-figure-6.png", rows=3, title="KBF Figure 6: load of the chassis, road class C"
     ) as axes:
-        for i, (ax, name) in enumerate(zip(axes, TRUCK_PARAMETERS, strict=True)):
-            columns = {own: found.parameters[:, i] for own, found in estimates.items()}
+        for ax, name in zip(axes, TRUCK_PARAMETERS, strict=True):
+            columns = {own: found.absolute(name) for own, found in estimates.items()}
             _draw(ax, drive, name, columns)
             ax.set(ylim=(0.0, 1.6 * drive.truth[name].max()))
         axes[0].legend(ncols=3, fontsize="small")
@@ -80,7 +80,7 @@ def figure_6(seeds: int, jobs: int, out: Path) -> Result:
 def _times(seed: int) -> list[list[list[float]]]:
     """Settling times of a seed by estimator, parameter and event [s]."""
     drive = make_drive(CASE, seed)
-    found = [ESTIMATORS[name](CASE, drive).parameters.T for name in SHOWN]
+    found = [absolute(ESTIMATORS[name](CASE, drive)) for name in SHOWN]
     return [
         [settling_times(drive, n, own) for n, own in zip(TRUCK_PARAMETERS, each, strict=True)]
         for each in found

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.benchmarks.kalman_bucy import Estimate
+from estimators.base import Estimate
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Row
 from scenarios.papers.truck_drive import LOAD_STEPS, NOISE, SAMPLE_TIME, TruckCase, make_drive
@@ -56,6 +56,11 @@ class Run:
     estimators: Mapping[str, Estimator]
 
 
+def absolute(estimate: Estimate) -> NDArray[np.float64]:
+    """Mass [kg], roll and pitch inertia [kg m2]. Shape (3, n)."""
+    return np.array([estimate.absolute(name) for name in TRUCK_PARAMETERS])
+
+
 def score(drive: Drive, estimate: Estimate) -> Scores:
     """RMSE and MAPE of KBF Eq. (10), and the time to 10 % after a load step.
 
@@ -63,13 +68,13 @@ def score(drive: Drive, estimate: Estimate) -> Scores:
     The percentage leaves out the sample at rest, whose true velocities are zero.
     """
     scores: Scores = {}
-    columns = np.hstack([estimate.parameters, estimate.velocity]).T
+    columns = np.vstack([absolute(estimate), estimate.outputs.T])
     for name, own in zip(UNITS, columns, strict=True):
         true = drive.truth[name]
         relative = np.divide(true - own, true, out=np.zeros_like(own), where=true != 0)
         scores[name, "mape_pct"] = float(100 * np.abs(relative).mean())
         scores[name, "rmse"] = float(np.sqrt(np.mean((true - own) ** 2)))
-    for name, own in zip(TRUCK_PARAMETERS, estimate.parameters.T, strict=True):
+    for name, own in zip(TRUCK_PARAMETERS, absolute(estimate), strict=True):
         times = settling_times(drive, name, own)[1:]
         scores[name, "time_to_10pct"] = max(times, default=np.nan)
     return scores

@@ -71,10 +71,7 @@ def write_joint_timeline(
 
 def _values(i: int, estimate: JointEstimate) -> Array:
     """(N,) of the i-th of all that is estimated."""
-    parameters = len(estimate.estimated) - len(estimate.fault_names)
-    if i < parameters:
-        return estimate[estimate.estimated[i]]
-    return estimate.faults[:, i - parameters]
+    return estimate[estimate.estimated[i]]
 
 
 def _truth(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.estimate import Estimate
+from estimators.base import Estimate
 from estimators.til import state_and_mass
 from scenarios.experiment.state_study import Belief, Run, observe
 from scenarios.plants.mismatch import MISMATCHES, real_vehicle

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import twin
-from estimators.estimate import Estimate
+from estimators.base import Estimate
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import twin
-from estimators.estimate import Estimate
-from estimators.peers.staged import Stage, StagedEstimate
+from estimators.base import Estimate
+from estimators.ensemble.staged import Stage, StagedEstimate
 from scenarios.timeline import scene as timeline_3d
 
 if TYPE_CHECKING:

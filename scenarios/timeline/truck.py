@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import models
-from estimators.benchmarks.kalman_bucy import Estimate
+from estimators.base import Estimate
 from scenarios.papers.truck_score import UNITS
 from scenarios.timeline import scene as timeline_3d
 from scenarios.timeline import timeline as tl
@@ -48,7 +48,7 @@ def write_truck_timeline(
         TwinError: the file cannot be written.
     """
     nominal = TruckParameters().nominal.parameters
-    load = [_parameter_plot(i, name, drive, estimates) for i, name in enumerate(TRUCK_PARAMETERS)]
+    load = [_parameter_plot(name, drive, estimates) for name in TRUCK_PARAMETERS]
     rates = [_rate_plot(i, name, drive, estimates) for i, name in enumerate(RATES)]
     scene = timeline_3d.view_of("truck", np.array(_EYE), np.array((0.0, 0.0, 1.2)))
     limits = [(0.0, 2.5 * value) for value in nominal]
@@ -59,15 +59,15 @@ def write_truck_timeline(
             tl.send_plot(to, drive.time, plot)
 
 
-def _parameter_plot(i: int, name: str, drive: Drive, estimates: Mapping[str, Estimate]) -> tl.Plot:
+def _parameter_plot(name: str, drive: Drive, estimates: Mapping[str, Estimate]) -> tl.Plot:
     """Truth, the first estimate in its band, the second."""
     (first, found), *others = estimates.items()
-    values, band = found.parameters[:, i], SIGMAS * found.parameters_sd[:, i]
+    values, band = found.absolute(name), SIGMAS * found.sd_of(name)
     lines = [
         tl.Line("upper", f"+{SIGMAS:g} standard deviations", values + band, tl.BAND_COLOUR, 1.0),
         tl.Line("lower", f"-{SIGMAS:g} standard deviations", values - band, tl.BAND_COLOUR, 1.0),
         tl.Line(first, first, values, tl.TWIN, 2.5),
-        *(tl.Line(other, other, e.parameters[:, i], _SECOND, 1.5) for other, e in others),
+        *(tl.Line(other, other, e.absolute(name), _SECOND, 1.5) for other, e in others),
         tl.Line("truth", "truth", drive.truth[name], tl.TRUTH, 2.0),
     ]
     return tl.Plot(f"parameters/{name}", f"{name} [{UNITS[name]}]", lines)
@@ -77,7 +77,7 @@ def _rate_plot(i: int, name: str, drive: Drive, estimates: Mapping[str, Estimate
     first, found = next(iter(estimates.items()))
     lines = [
         tl.Line("measured", "measured", drive.channel(name), tl.MEASURED, 1.0),
-        tl.Line(first, first, found.velocity[:, i], tl.TWIN, 3.0),
+        tl.Line(first, first, found.outputs[:, i], tl.TWIN, 3.0),
         tl.Line("truth", "truth", drive.truth[name], tl.TRUTH, 1.2),
     ]
     return tl.Plot(f"rates/{name}", f"{name} [{UNITS[name]}]", lines)

@@ -17,19 +17,21 @@ Nothing that is wrong in an earlier stage, or in the products of inertia, which 
 repaired in a later one: that is what joint estimation is for.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimators.base import Estimate
+from estimators.black_box import settle
+from estimators.ensemble import staged_kernel
 from estimators.ensemble.blocks import new_block
-from estimators.joint.observer import PRIOR_SD
-from estimators.parameter_estimate import ParameterEstimate
-from estimators.peers import staged_kernel
-from estimators.peers.staged_kernel import Log, Memory, Setup
-from estimators.peers.unscented import BIAS_SD, BLOCK, SPEED_GAIN, STEP
+from estimators.ensemble.staged_kernel import Log, Memory, Setup
+from estimators.ensemble.unscented import BIAS_SD, BLOCK, SPEED_GAIN, STEP
+from estimators.entry import Entry, Given
+from estimators.priors import PRIOR_SD, initial_deltas
 from estimators.til.law import ParameterLaw, compile_laws
 from twin import OUTPUTS, PARAMETERS, STATES, Drive, Fleet, TwinError, Vehicle, check_inputs
 
@@ -80,7 +82,7 @@ class StagedSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StagedEstimate(ParameterEstimate):
+class StagedEstimate(Estimate):
     """A run of the staged observer; each fit claims its sd as if all else were right.
 
     Attributes:
@@ -90,64 +92,84 @@ class StagedEstimate(ParameterEstimate):
     stage: NDArray[np.int64]
 
 
-def staged(
-    vehicle: Vehicle,
-    drive: Drive,
-    noise_sd: ArrayLike,
-    laws: Sequence[ParameterLaw],
-    settings: StagedSettings = StagedSettings(),
-    *,
-    speed: float,
-) -> StagedEstimate:
-    """Observes a whole drive, one stage after the other.
+class StagedObserver:
+    """Estimates mass, pitch inertia, centre of mass, roll and yaw inertia one after the other.
 
     Args:
         vehicle: of the twins.
-        drive: of N samples.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
         laws: one each of mass, Jyy, Jxx and Jzz.
         settings: when which stage runs.
-        speed: at the start [m/s].
 
     Raises:
-        TwinError: there are other laws, the drive does not fit the twins, or a twin blew up.
+        TwinError: there are other laws.
     """
-    named = tuple(law.parameter for law in laws)
-    if sorted(named) != ["Jxx", "Jyy", "Jzz", "mass"]:
-        raise TwinError(f"staged: laws are of {', '.join(named)}; allowed: mass, Jxx, Jyy, Jzz")
-    check_inputs(drive.inputs, "drive")
-    fleet, n = Fleet(vehicle, 1 + len(CM)), len(drive)
-    setup = _setup(settings, np.asarray(noise_sd, dtype=np.float64), fleet.twins[0].dt)
-    table, law_memory = compile_laws(laws, setup.dt)
-    memory = _memory(law_memory)
-    staged_kernel.set_all(fleet.cars, memory.theta)
-    for twin in fleet.twins:
-        twin.reset(speed, drive.inputs[0, 9:13])
-    log = Log(
-        states=np.empty((n, len(STATES))),
-        parameters=np.empty((n, len(PARAMETERS))),
-        outputs=np.empty((n, len(OUTPUTS))),
-        extended=np.empty((n, *fleet.cars[0].tyre_output.shape)),
-        stage=np.empty(n, dtype=np.int64),
-        sd=np.empty((n, len(laws) + len(CM))),
-    )
-    done = staged_kernel.run(
-        fleet.cars, setup, memory, new_block(len(fleet)), table,
-        drive.inputs, drive.measurements, log,
-    )  # fmt: skip
-    if done < n:
-        raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
-    return StagedEstimate(
-        time=drive.time,
-        states=log.states,
-        parameters=log.parameters,
-        outputs=log.outputs,
-        extended=log.extended.reshape(n, -1),
-        nominal=fleet.cars[0].nominal.copy(),
-        stage=log.stage,
-        estimated=(*named, *CM),
-        sd=log.sd,
-    )
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        noise_sd: ArrayLike,
+        laws: Sequence[ParameterLaw],
+        settings: StagedSettings = StagedSettings(),
+    ) -> None:
+        named = tuple(law.parameter for law in laws)
+        if sorted(named) != ["Jxx", "Jyy", "Jzz", "mass"]:
+            raise TwinError(f"staged: laws are of {', '.join(named)}; allowed: mass, Jxx, Jyy, Jzz")
+        self.estimated = (*named, *CM)
+        self.fleet = Fleet(vehicle, 1 + len(CM))
+        self._setup = _setup(settings, np.asarray(noise_sd, dtype=np.float64), self.dt)
+        self._laws = compile_laws(laws, self.dt)
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return self.fleet.twins[0].dt
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """See `estimators.base.Estimator`."""
+        self._memory = _memory(self._laws[1].copy(), initial_deltas(parameters))
+        staged_kernel.set_all(self.fleet.cars, self._memory.theta)
+        for twin in self.fleet.twins:
+            settle(twin, speed, road)
+
+    def run(self, drive: Drive) -> StagedEstimate:
+        """Observes a whole drive, one stage after the other.
+
+        Raises:
+            TwinError: the drive does not fit the twins, or a twin blew up.
+        """
+        check_inputs(drive.inputs, "drive")
+        fleet, n = self.fleet, len(drive)
+        log = Log(
+            states=np.empty((n, len(STATES))),
+            parameters=np.empty((n, len(PARAMETERS))),
+            outputs=np.empty((n, len(OUTPUTS))),
+            extended=np.empty((n, *fleet.cars[0].tyre_output.shape)),
+            stage=np.empty(n, dtype=np.int64),
+            sd=np.empty((n, len(self.estimated))),
+        )
+        done = staged_kernel.run(
+            fleet.cars, self._setup, self._memory, new_block(len(fleet)), self._laws[0],
+            drive.inputs, drive.measurements, log,
+        )  # fmt: skip
+        if done < n:
+            raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
+        return StagedEstimate(
+            time=drive.time,
+            states=log.states,
+            parameters=log.parameters,
+            outputs=log.outputs,
+            extended=log.extended.reshape(n, -1),
+            nominal=fleet.cars[0].nominal.copy(),
+            stage=log.stage,
+            estimated=self.estimated,
+            sd=log.sd,
+        )
 
 
 def _setup(settings: StagedSettings, noise_sd: Array, dt: float) -> Setup:
@@ -168,15 +190,31 @@ def _setup(settings: StagedSettings, noise_sd: Array, dt: float) -> Setup:
     )
 
 
-def _memory(laws: Array) -> Memory:
+def _memory(laws: Array, theta: Array) -> Memory:
     return Memory(
         stage=np.zeros(1, dtype=np.int64),
         clock=np.zeros(len(Stage)),
         yaw_rate=np.zeros(1),
-        theta=np.zeros(len(PARAMETERS)),
+        theta=theta,
         laws=laws,
-        z=np.zeros(PRIOR.size),
+        z=np.append([theta[PARAMETERS.index(name)] for name in CM], np.zeros(len(BIAS_SD))),
         covariance=np.diag(PRIOR**2),
         slow=np.zeros((2, 2 + len(CM), len(OUTPUTS))),
         begun=np.zeros(1, dtype=np.int64),
     )
+
+
+def _make(given: Given) -> StagedObserver:
+    settings = given.settings or StagedSettings()
+    return StagedObserver(given.car(), given.noise(OUTPUTS), given.laws, settings)
+
+
+ENTRY = Entry(
+    name="staged",
+    words="single laws one after the other, TiL Section 4.5",
+    make=_make,
+    needs=frozenset(("twin", "noise_sd", "laws")),
+    channels=OUTPUTS,
+    gives=("mass", "Jyy", *CM, "Jxx", "Jzz", "sideslip"),
+    sd=True,
+)

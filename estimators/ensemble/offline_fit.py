@@ -12,15 +12,16 @@ the vehicle, and the fit then pays in its parameters.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimators.estimate import Estimate
-from estimators.joint.observer import OFFSETS, PRIOR_SD
-from estimators.parameter_estimate import ParameterEstimate
-from estimators.peers.unscented import BIAS_SD
+from estimators.base import Estimate
+from estimators.ensemble.unscented import BIAS_SD
+from estimators.entry import Entry, Given
+from estimators.priors import OFFSETS, PRIOR_SD, initial_deltas
 from estimators.til.observer import Observer
 from twin import LOAD, OUTPUTS, PARAMETERS, SCALES, Drive, Twin, TwinError, Vehicle
 
@@ -34,62 +35,89 @@ TOLERANCE = 1e-6
 MOST_STEPS = 20
 
 
-def offline_fit(
-    vehicle: Vehicle,
-    drive: Drive,
-    noise_sd: ArrayLike,
-    parameters: Sequence[str] = (*LOAD, *SCALES),
-    *,
-    speed: float,
-    prior_sd: Mapping[str, float] | None = None,
-) -> ParameterEstimate:
-    """Fits parameters of the twin to a whole drive.
+class OfflineFit:
+    """Fits parameters of a twin to a whole drive.
 
     Args:
         vehicle: of the twin.
-        drive: of N samples.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
-        parameters: of `twin.PARAMETERS`, p of them; the others stay nominal.
-        speed: at the start [m/s].
-        prior_sd: by parameter, instead of `estimators.joint.observer.PRIOR_SD`.
-
-    Returns:
-        The run of the twin with the fitted parameters, the same in all samples.
+        parameters: of `twin.PARAMETERS`, p of them; the others stay as they are at the start.
+        prior_sd: by parameter, instead of `estimators.priors.PRIOR_SD`.
 
     Raises:
-        TwinError: a name is unknown, the drive does not fit the twin, or the twin blew up.
+        TwinError: a name or a number is not allowed.
     """
-    from scipy.optimize import least_squares  # not at the top: it takes its time
 
-    unknown = [name for name in parameters if name not in PARAMETERS]
-    if unknown:
-        raise TwinError(
-            f"fit: parameter {unknown[0]!r} is unknown; allowed: {', '.join(PARAMETERS)}"
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        noise_sd: ArrayLike,
+        parameters: Sequence[str] = (*LOAD, *SCALES),
+        prior_sd: Mapping[str, float] | None = None,
+    ) -> None:
+        unknown = [name for name in parameters if name not in PARAMETERS]
+        if unknown:
+            raise TwinError(
+                f"fit: parameter {unknown[0]!r} is unknown; allowed: {', '.join(PARAMETERS)}"
+            )
+        self.estimated = tuple(parameters)
+        prior = PRIOR_SD | dict(prior_sd or {})
+        self._scale = np.array([*(prior[name] for name in parameters), *BIAS_SD])
+        self._noise_sd = _checked_noise(np.asarray(noise_sd, dtype=np.float64))
+        self._observer = Observer(Twin(vehicle), [])
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return self._observer.dt
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """See `estimators.base.Estimator`; the fit starts at these parameters."""
+        initial_deltas(parameters)  # checks the names
+        self._start = _Start(speed, dict(parameters or {}), road)
+
+    def run(self, drive: Drive) -> Estimate:
+        """Fits a whole drive.
+
+        Returns:
+            The run of the twin with the fitted parameters, the same in all samples.
+
+        Raises:
+            TwinError: the drive does not fit the twin, or the twin blew up.
+        """
+        from scipy.optimize import least_squares  # not at the top: it takes its time
+
+        p = len(self.estimated)
+        problem = _Problem(
+            self._observer, drive, _measured(drive, self._noise_sd), self.estimated,
+            self._start, self._scale,
+        )  # fmt: skip
+        solution = least_squares(
+            problem.residuals,
+            np.zeros(self._scale.size),
+            jac=problem.jacobian,  # pyright: ignore[reportArgumentType] # SciPy comes without types
+            ftol=TOLERANCE,
+            max_nfev=MOST_STEPS,
         )
-    prior = PRIOR_SD | dict(prior_sd or {})
-    scale = np.array([*(prior[name] for name in parameters), *BIAS_SD])
-    measured = _measured(drive, np.asarray(noise_sd, dtype=np.float64))
-    problem = _Problem(vehicle, drive, measured, tuple(parameters), speed, scale)
-    solution = least_squares(
-        problem.residuals,
-        np.zeros(scale.size),
-        jac=problem.jacobian,  # pyright: ignore[reportArgumentType] # SciPy comes without types
-        ftol=TOLERANCE,
-        max_nfev=MOST_STEPS,
-    )
-    # in units of the prior, of which the last rows of the Jacobian are
-    covariance = np.linalg.inv(solution.jac.T @ solution.jac) * np.outer(scale, scale)
-    estimate, p = problem.run(solution.x), len(parameters)
-    return ParameterEstimate(
-        time=estimate.time,
-        states=estimate.states,
-        parameters=estimate.parameters,
-        outputs=estimate.outputs,
-        extended=estimate.extended,
-        nominal=estimate.nominal,
-        estimated=tuple(parameters),
-        sd=np.broadcast_to(np.sqrt(np.diag(covariance))[:p], (len(drive), p)),
-    )
+        # in units of the prior, of which the last rows of the Jacobian are
+        scale = np.outer(self._scale, self._scale)
+        covariance = np.linalg.inv(solution.jac.T @ solution.jac) * scale
+        sd = np.sqrt(np.diag(covariance))[:p]
+        found = problem.run(solution.x)
+        return replace(found, estimated=self.estimated, sd=np.broadcast_to(sd, (len(drive), p)))
+
+
+class _Start(NamedTuple):
+    """Where the drive begins: speed [m/s], deltas by name, (4,) heights of the road [m]."""
+
+    speed: float
+    parameters: Mapping[str, float]
+    road: ArrayLike | None
 
 
 class _Measured(NamedTuple):
@@ -104,27 +132,28 @@ class _Problem:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        observer: Observer,
         drive: Drive,
         measured: _Measured,
         parameters: tuple[str, ...],
-        speed: float,
+        start: _Start,
         scale: Array,
     ) -> None:
-        self._twin = Twin(vehicle)
-        self._observer, self._drive, self._measured = Observer(self._twin, []), drive, measured
-        self._parameters, self._speed, self._scale = parameters, speed, scale
+        self._observer, self._drive, self._measured = observer, drive, measured
+        self._parameters, self._start, self._scale = parameters, start, scale
+        self._centre = np.array([start.parameters.get(name, 0.0) for name in parameters])
         self._last: tuple[Array, Estimate] | None = None
 
     def _simulate(self, theta: Array) -> Estimate:
         """The open-loop twin over the drive, with parameters theta (p,)."""
-        load = dict(zip(self._parameters, theta.tolist(), strict=True))
-        self._observer.reset(self._speed, load)
-        self._twin.reset(self._speed, self._drive.inputs[0, 9:13])
+        fitted = dict(zip(self._parameters, theta.tolist(), strict=True))
+        self._observer.reset(
+            self._start.speed, {**self._start.parameters, **fitted}, self._start.road
+        )
         return self._observer.run(self._drive)
 
     def _theta(self, x: Array) -> Array:
-        return (x * self._scale)[: len(self._parameters)]
+        return self._centre + (x * self._scale)[: len(self._parameters)]
 
     def run(self, x: Array) -> Estimate:
         """The twin's run at x; the last one is kept."""
@@ -154,12 +183,16 @@ class _Problem:
         return np.vstack([np.column_stack(stacked), np.eye(x.size)])
 
 
-def _measured(drive: Drive, sd: Array) -> _Measured:
+def _checked_noise(sd: Array) -> Array:
     if sd.shape != (len(OUTPUTS),) or not (np.isnan(sd) | (sd > 0.0)).all():
         raise TwinError(
             f"fit: noise_sd is {sd.tolist()}; allowed: {len(OUTPUTS)} numbers above zero, NaN for "
             "a channel that is not used"
         )
+    return sd
+
+
+def _measured(drive: Drive, sd: Array) -> _Measured:
     # A block lacks a channel as soon as one of its samples does: its mean would not be the twin's
     mean = _block_means(drive.measurements)
     weight = np.sqrt(BLOCK) / sd
@@ -170,3 +203,19 @@ def _block_means(values: Array) -> Array:
     """(M, k) means of (N, k) values; a last block that is not full is left out."""
     m = len(values) // BLOCK
     return values[: m * BLOCK].reshape(m, BLOCK, -1).mean(axis=1)
+
+
+def _make(given: Given) -> OfflineFit:
+    parameters = given.parameters or (*LOAD, *SCALES)
+    return OfflineFit(given.car(), given.noise(OUTPUTS), parameters, given.prior_sd)
+
+
+ENTRY = Entry(
+    name="least-squares",
+    words="least squares over the whole recorded drive",
+    make=_make,
+    needs=frozenset(("twin", "noise_sd")),
+    channels=OUTPUTS,
+    gives=(*LOAD, *SCALES, "sideslip"),
+    sd=True,
+)

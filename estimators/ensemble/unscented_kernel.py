@@ -1,4 +1,4 @@
-"""The compiled part of `estimators.peers.unscented`: sigma points of the parameters, each a twin.
+"""The compiled part of the unscented filter: sigma points of the parameters, each a twin.
 
 Twin 0 stands at the estimate, twins i and p + i at plus and minus the i-th column of the root of
 the parameters' covariance. The regression of their outputs and states on their parameters gives

@@ -1,1 +1,0 @@
-"""What the joint observer is measured against."""
