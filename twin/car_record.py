@@ -2,9 +2,11 @@
 
 import numpy as np
 from numba import from_dtype
+from numpy.typing import NDArray
 
 from twin.channels import OUTPUTS, TYRE_OUTPUTS, WHEELS
 from twin.parameters import PARAMETERS
+from twin.scales import AXLES, MOST_FACTORS
 from twin.tyre.record import TYRE_DTYPE
 
 # Arrays of MjData (state, kinematics, sensors) and MjModel (inertia, steering), by MuJoCo's names;
@@ -15,12 +17,8 @@ DATA_VIEWS = (
 )
 MODEL_VIEWS = (
     *("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_subtreemass", "body_quat"),
-    *("jnt_stiffness", "qpos_spring", "tendon_stiffness", "dof_damping"),
 )
-AXLES = ("front", "rear")
 _PER_WHEEL = (len(WHEELS),)
-# Scaling factors of a tyre that parameters change: friction, cornering stiffness, relaxation
-SCALED_TYRE = ("lmux", "lmuy", "lky", "lsgkp", "lsgal")
 
 CAR_DTYPE = np.dtype(
     [
@@ -41,21 +39,20 @@ CAR_DTYPE = np.dtype(
         ("track", np.float64),  # [m]
         ("steering_ratio", np.float64),
         ("ackermann", np.float64),
-        ("drag_area", np.float64),  # [m2], in force
-        ("torque_share", np.float64, (2,)),  # of drive and brake torque, what reaches the wheels
-        ("lift_area", np.float64, (len(AXLES),)),  # [m2], positive pushes down
+        ("drag_area", np.float64),  # [m2]
+        ("drive_share", np.float64, _PER_WHEEL),  # of the drive torque, what reaches each wheel
+        ("brake_share", np.float64, _PER_WHEEL),
+        *((f"lift_area_{axle}", np.float64) for axle in AXLES),  # [m2], positive pushes down
         ("axle", np.float64, (len(AXLES),)),  # x of its hubs in the chassis frame [m]
         ("spin_inertia", np.float64, _PER_WHEEL),  # of each wheel about its axis [kg m2]
         ("nominal", np.float64, (len(PARAMETERS),)),  # the unloaded chassis; 1 for a scale
-        ("bar", np.int64, (len(AXLES),)),  # tendon of each anti-roll bar; -1: none
-        # of each wheel what `twin.scales` scales, as the files have it
-        ("nominal_tyre", np.float64, (len(SCALED_TYRE), *_PER_WHEEL)),
-        ("nominal_drag_area", np.float64),
-        ("nominal_torque_share", np.float64, (2,)),
-        ("nominal_stiffness", np.float64, _PER_WHEEL),  # [N/m]
-        ("nominal_spring", np.float64, _PER_WHEEL),  # free position [m]
-        ("nominal_bar", np.float64, (len(AXLES),)),  # [N/m]
-        ("nominal_damping", np.float64, _PER_WHEEL),  # [N s/m]
+        # of each number that parameters scale: address, as the files have it, index in `p`, and
+        # whether the parameter divides it; see `twin.scale_setter`
+        ("factors", np.int64),
+        ("factor_address", np.int64, (MOST_FACTORS,)),
+        ("factor_nominal", np.float64, (MOST_FACTORS,)),
+        ("factor_parameter", np.int64, (MOST_FACTORS,)),
+        ("factor_divides", np.int64, (MOST_FACTORS,)),
         ("compiled_inertia", np.float64, (7,)),  # principal moments, and their axes' quaternion
         ("other_mass", np.float64, (2,)),  # of the world's and the chassis' trees, without chassis
         ("side", np.float64, _PER_WHEEL),  # 1 for a tyre as measured, -1 for a mirrored one
@@ -81,9 +78,6 @@ Car = np.record
 CAR = from_dtype(CAR_DTYPE)  # its type in compiled code
 
 
-def new_car(**fields: object) -> Car:
-    """A car of these fields, the others zero."""
-    car = np.zeros(1, np.dtype((np.record, CAR_DTYPE)))
-    for name, value in fields.items():
-        car[name] = value
-    return car[0]
+def new_cars(size: int) -> NDArray[np.void]:
+    """(size,) records of zeros."""
+    return np.zeros(size, np.dtype((np.record, CAR_DTYPE)))

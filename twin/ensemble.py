@@ -1,9 +1,7 @@
 """Several twins of one vehicle side by side, for observers that compare them."""
 
-import numpy as np
-
 from twin.car.vehicle import Vehicle
-from twin.car_record import CAR_DTYPE
+from twin.car_record import new_cars
 from twin.errors import TwinError
 from twin.twin import Twin
 
@@ -25,11 +23,8 @@ class Fleet:
         if size < 1:
             raise TwinError(f"fleet: size is {size}; allowed: at least 1")
         self.vehicle = vehicle
-        self.twins = tuple(Twin(vehicle) for _ in range(size))
-        self.cars = np.recarray(size, dtype=CAR_DTYPE)
-        for i, twin in enumerate(self.twins):
-            self.cars[i] = twin.car
-            twin.car = self.cars[i]
+        self.cars = new_cars(size)
+        self.twins = tuple(Twin(vehicle, self.cars[i : i + 1]) for i in range(size))
 
     def __len__(self) -> int:
         """Number of twins."""

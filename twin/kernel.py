@@ -12,8 +12,8 @@ from numba import njit, types
 
 from twin.car_record import CAR
 from twin.chassis import set_load
-from twin.parameters import AXLE_FORCES
-from twin.scales import set_scales
+from twin.parameters import SCALE_FACTORS
+from twin.scale_setter import set_scales
 from twin.states import copy_states, correct_states, states_are_sound
 from twin.stepping import step_car
 
@@ -76,7 +76,7 @@ def set_parameters(car, p):
     """
     set_load(car, p.ctypes)
     set_scales(car, p.ctypes)
-    for i in range(AXLE_FORCES.start, AXLE_FORCES.stop):
+    for i in range(SCALE_FACTORS.stop, p.size):
         car.parameters[i] = p[i]
 
 

@@ -1,108 +1,154 @@
-"""Scales what a model of a car gets wrong besides its load: tyres, drag, springs, torques.
+"""What a model of a car gets wrong besides its load, as factors on numbers of the car.
 
-`Vehicle.scaled` makes another car of it ("the real vehicle"); `set_scales` does the same to a twin
-while it drives. Springs keep the nominal ride height: a stiffer one is the shorter by as much.
+`TARGETS` alone says which numbers a scale multiplies. `Vehicle.scaled` makes another car with it
+("the real vehicle"); `twin.scale_setter` does the same to a twin while it drives.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Literal, NamedTuple
 
 import mujoco
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from twin.car_record import AXLES, CAR, SCALED_TYRE
 from twin.channels import WHEELS
-from twin.compiled.boundary import VECTOR, behind
-from twin.compiled.simd import pointer
-from twin.parameters import LARGEST_SCALE, LEAST_SCALE, SCALE_FACTORS, SCALES, P
-from twin.tyre.four_tyres import NAMES
+from twin.parameters import SCALES
 
-# Coefficients of a .tir file behind each name; those after the first three are no parameters of
-# a running twin, but a real vehicle has others than its files say
-TYRE_SCALES = {
-    "tyre_friction": ("lmux", "lmuy"),
-    "cornering_stiffness": ("lky",),
-    "relaxation": ("lsgkp", "lsgal"),
-    "slip_stiffness": ("lkx",),
-    "combined_slip": ("lyka",),  # how soon lateral force is lost to slip
-    "load_of_largest_stiffness": ("pky2",),  # large: cornering stiffness in proportion to load
-    "lateral_curvature": ("ley",),
+AXLES = ("front", "rear")
+Array = NDArray[np.float64]
+
+
+class Target(NamedTuple):
+    """Numbers of a car that a scale multiplies.
+
+    Attributes:
+        where: "tyre", a coefficient of the tyres; "number", one of <custom> in the MJCF, and a
+            field of the car's record; "share", a field of the car's record, per wheel; "model", an
+            array of `mujoco.MjModel`, per wheel or per axle (see `places`).
+        name: of the coefficient, number, field or array.
+        axle: "front" or "rear"; empty for both.
+        divides: it divides the numbers instead.
+    """
+
+    where: Literal["tyre", "number", "share", "model"]
+    name: str
+    axle: str = ""
+    divides: bool = False
+
+
+def _tyre(*names: str) -> tuple[Target, ...]:
+    return tuple(Target("tyre", name) for name in names)
+
+
+_TYRES = {
+    "tyre_friction": _tyre("lmux", "lmuy"),
+    "cornering_stiffness": _tyre("lky"),
+    "relaxation": _tyre("lsgkp", "lsgal"),
+    "slip_stiffness": _tyre("lkx"),
+    "combined_slip": _tyre("lyka"),  # how soon lateral force is lost to slip
+    "load_of_largest_stiffness": _tyre("pky2"),  # large: stiffness in proportion to load
+    "lateral_curvature": _tyre("ley"),
 }
-# Each for all tyres, or for those of an axle, as in rear_tyre_friction
-_TYRES = {"": slice(None), "front_": slice(0, 2), "rear_": slice(2, 4)}
-VEHICLE_SCALES = (
-    *SCALES,
-    *(name for name in TYRE_SCALES if name not in SCALES),
-    *(f"{axle}{name}" for name in TYRE_SCALES for axle in _TYRES if axle),
-    *("front_anti_roll", "rear_anti_roll", "steering_ratio"),
-)
-# Shares of the torques, `Car.torque_share`
-TORQUES = ("drive_torque", "brake_torque")
-BARS = tuple(f"anti_roll_{axle}" for axle in AXLES)
+_ALL_TARGETS = {
+    **_TYRES,
+    "drag": (Target("number", "drag_area"),),
+    # with the anti-roll bars, at the nominal ride height: a stiffer spring is shorter by as much
+    "spring": (
+        Target("model", "jnt_stiffness"),
+        Target("model", "qpos_spring", divides=True),
+        Target("model", "tendon_stiffness"),
+    ),
+    "damper": (Target("model", "dof_damping"),),
+    "drive_torque": (Target("share", "drive_share"),),
+    "brake_torque": (Target("share", "brake_share"),),
+    **{
+        f"{axle}_{name}": tuple(target._replace(axle=axle) for target in targets)
+        for axle in AXLES
+        for name, targets in _TYRES.items()
+    },
+    **{f"{axle}_anti_roll": (Target("model", "tendon_stiffness", axle),) for axle in AXLES},
+    "steering_ratio": (Target("number", "steering_ratio"),),
+}
+TARGETS: Mapping[str, tuple[Target, ...]] = {
+    name: _ALL_TARGETS[name] for name in (*SCALES, *_ALL_TARGETS)
+}
+"""By the name of a scale; those of `twin.SCALES`, the first, are parameters of a twin too."""
 
-_LMUX, _LMUY, _LKY, _LSGKP, _LSGAL = (NAMES.index(name) for name in SCALED_TYRE)
+VEHICLE_SCALES = tuple(TARGETS)
+MOST_FACTORS = 4 * sum(len(TARGETS[name]) for name in SCALES)
+"""On how many numbers of a running twin parameters act at most."""
 
 
 def scale_tyres(tyres: NDArray[np.void], factors: Mapping[str, float]) -> None:
-    """Scales four `twin.tyre.record.TYRE_DTYPE` in place, factors by `VEHICLE_SCALES`."""
-    for axle, wheels in _TYRES.items():
-        for name, keys in TYRE_SCALES.items():
-            factor = np.ones(len(WHEELS))
-            factor[wheels] = factors.get(axle + name, 1.0)
-            for key in keys:
-                tyres[key] = np.asarray(tyres[key], dtype=np.float64) * factor
+    """Scales four tyres in place.
+
+    Args:
+        tyres: (4,) records of `twin.tyre.record.TYRE_DTYPE`.
+        factors: by `VEHICLE_SCALES`.
+    """
+    for target, factor in _chosen(factors, "tyre"):
+        _scale(tyres[target.name], _wheels(target), target, factor)
+
+
+def scale_shares(car: NDArray[np.void], factors: Mapping[str, float]) -> None:
+    """Scales in place what belongs to the car's record only.
+
+    Args:
+        car: (1,) record of `twin.car_record.CAR_DTYPE`.
+        factors: by `VEHICLE_SCALES`.
+    """
+    for target, factor in _chosen(factors, "share"):
+        _scale(car[target.name][0], _wheels(target), target, factor)
 
 
 def scale_model(model: mujoco.MjModel, factors: Mapping[str, float]) -> None:
-    """Scales a compiled car in place, factors by `VEHICLE_SCALES`."""
-    travels = [model.joint(f"travel_{wheel}") for wheel in WHEELS]
-    spring = factors.get("spring", 1.0)
-    for joint in travels:
-        model.jnt_stiffness[joint.id] *= spring
-        model.qpos_spring[joint.qposadr] /= spring
-        model.dof_damping[joint.dofadr] *= factors.get("damper", 1.0)
-    for axle, bar in zip(AXLES, bars(model), strict=True):
-        if bar >= 0:
-            model.tendon_stiffness[bar] *= spring * factors.get(f"{axle}_anti_roll", 1.0)
-    for name, number in (("drag", "drag_area"), ("steering_ratio", "steering_ratio")):
-        numeric = model.numeric(number)
-        model.numeric_data[model.numeric_adr[numeric.id]] *= factors.get(name, 1.0)
+    """Scales a compiled car in place.
+
+    Args:
+        model: of the car.
+        factors: by `VEHICLE_SCALES`.
+    """
+    for target, factor in _chosen(factors, "model"):
+        _scale(getattr(model, target.name), places(model, target), target, factor)
+    for target, factor in _chosen(factors, "number"):
+        address = model.numeric_adr[model.numeric(target.name).id]
+        _scale(model.numeric_data, [address], target, factor)
 
 
-def bars(model: mujoco.MjModel) -> list[int]:
-    """Tendons of the anti-roll bars, front and rear; -1 where there is none."""
-    return [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name) for name in BARS]
+def _chosen(factors: Mapping[str, float], where: str) -> Iterator[tuple[Target, float]]:
+    for name, factor in factors.items():
+        for target in TARGETS[name]:
+            if target.where == where:
+                yield target, factor
 
 
-@behind(types.void, CAR, VECTOR)
-def set_scales(car, p):
-    """The part of `twin.kernel.set_parameters` that is no load."""
-    now = car.parameters
-    changed = False
-    for i in range(SCALE_FACTORS.start, SCALE_FACTORS.stop):
-        p[i] = min(max(p[i], LEAST_SCALE - 1.0), LARGEST_SCALE - 1.0)
-        changed = changed or p[i] != now[i]
-        now[i] = p[i]
-    if not changed:
-        return
-    friction, cornering = 1.0 + p[P.tyre_friction], 1.0 + p[P.cornering_stiffness]
-    spring, damper = 1.0 + p[P.spring], 1.0 + p[P.damper]
-    relaxation = 1.0 + p[P.relaxation]
-    car.torque_share[0] = car.nominal_torque_share[0] * (1.0 + p[P.drive_torque])
-    car.torque_share[1] = car.nominal_torque_share[1] * (1.0 + p[P.brake_torque])
-    car.drag_area = car.nominal_drag_area * (1.0 + p[P.drag])
-    stiffness, free = pointer(car.jnt_stiffness), pointer(car.qpos_spring)
-    damping, bar = pointer(car.dof_damping), pointer(car.tendon_stiffness)
-    for w in range(len(WHEELS)):
-        car.tyres[_LMUX, w] = car.nominal_tyre[0, w] * friction
-        car.tyres[_LMUY, w] = car.nominal_tyre[1, w] * friction
-        car.tyres[_LKY, w] = car.nominal_tyre[2, w] * cornering
-        car.tyres[_LSGKP, w] = car.nominal_tyre[3, w] * relaxation
-        car.tyres[_LSGAL, w] = car.nominal_tyre[4, w] * relaxation
-        stiffness[car.travel_joint[w]] = car.nominal_stiffness[w] * spring
-        free[car.travel_qpos[w]] = car.nominal_spring[w] / spring
-        damping[car.travel_dof[w]] = car.nominal_damping[w] * damper
-    for i in range(len(AXLES)):
-        if car.bar[i] >= 0:
-            bar[car.bar[i]] = car.nominal_bar[i] * spring
+def _scale(numbers: Array, places: list[int], target: Target, factor: float) -> None:
+    if target.divides:
+        numbers[places] /= factor
+    else:
+        numbers[places] *= factor
+
+
+def places(model: mujoco.MjModel, target: Target) -> list[int]:
+    """Indices of a target's numbers in their array.
+
+    Args:
+        model: of the car.
+        target: of which; a single number has index 0.
+    """
+    if target.where == "number":
+        return [0]
+    if target.name == "tendon_stiffness":
+        axles = [target.axle] if target.axle else AXLES
+        names = [f"anti_roll_{axle}" for axle in axles]
+        bars = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name) for name in names]
+        return [bar for bar in bars if bar >= 0]
+    if target.where != "model":
+        return _wheels(target)
+    travels = [model.joint(f"travel_{WHEELS[w]}").id for w in _wheels(target)]
+    of_joint = {"qpos_spring": model.jnt_qposadr, "dof_damping": model.jnt_dofadr}
+    return [int(of_joint.get(target.name, np.arange(model.njnt))[joint]) for joint in travels]
+
+
+def _wheels(target: Target) -> list[int]:
+    return [w for w, wheel in enumerate(WHEELS) if wheel[0] == target.axle[:1] or not target.axle]

@@ -64,7 +64,7 @@ def _air(car):
     turn, move = _vector(twist, 2 * car.chassis), _vector(twist, 2 * car.chassis + 1)
     speed = dot(combine(1.0, move, 1.0, cross(turn, difference(origin, com)), 0.0, move), ahead)
     pressure = 0.5 * AIR_DENSITY * speed * abs(speed)
-    front, rear = -abs(pressure) * car.lift_area[0], -abs(pressure) * car.lift_area[1]
+    front, rear = -abs(pressure) * car.lift_area_front, -abs(pressure) * car.lift_area_rear
     up = _axis(car, car.chassis, 2)
     applied = pointer(car.qfrc_applied)
     for i in range(3):
@@ -180,8 +180,8 @@ def step_car(car, u, y):
     _air(car)
     road = load(u, U.road_height_fl)
     _axle_forces(car, 0.25 * _total(road))
-    drive = load(u, U.drive_torque_fl) * car.torque_share[0]
-    brake = load(u, U.brake_torque_fl) * car.torque_share[1]
+    drive = load(u, U.drive_torque_fl) * load(car.drive_share.ctypes, 0)
+    brake = load(u, U.brake_torque_fl) * load(car.brake_share.ctypes, 0)
     _wheels(car, drive, brake, road, _road_normal(car, unpack(road)))
     mj_step2(car.model, car.data)
     sensordata = pointer(car.sensordata)

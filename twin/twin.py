@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin import kernel
+from twin.binding import bind
 from twin.car.fingerprint import fingerprint
 from twin.car.vehicle import Vehicle
-from twin.car_record import AXLES, DATA_VIEWS, MODEL_VIEWS, SCALED_TYRE, Car, new_car
+from twin.car_record import Car, new_cars
 from twin.channels import (
     CHANNEL,
     EXTENDED,
@@ -19,13 +20,10 @@ from twin.channels import (
     STATES,
     TYRE,
     TYRE_OUTPUTS,
-    WHEELS,
 )
 from twin.errors import TwinError
-from twin.parameters import FORCES, PARAMETERS, SCALES
-from twin.scales import TORQUES, bars
+from twin.parameters import PARAMETERS
 from twin.tyre.contact import ROAD
-from twin.tyre.four_tyres import table_of
 from twin.tyre.radius import effective_radius
 
 Array = NDArray[np.float64]
@@ -58,13 +56,21 @@ class Twin:
     extended = EXTENDED
     tyre_outputs = TYRE_OUTPUTS
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, room: NDArray[np.void] | None = None) -> None:
+        """Makes a twin that stands still.
+
+        Args:
+            vehicle: what it simulates.
+            room: (1,) record of `twin.car_record.CAR_DTYPE` for `car`, which must live as long; by
+                default the twin has its own.
+        """
         self.vehicle = vehicle
         self.model = vehicle.compile()
         self.data = mujoco.MjData(self.model)
         self._tyres = vehicle.tyres()
-        shares = [dict(vehicle.scales).get(name, 1.0) for name in TORQUES]
-        self.car = _bind(self.model, self.data, self._tyres, shares)
+        room = new_cars(1) if room is None else room
+        bind(room, self.model, self.data, self._tyres, dict(vehicle.scales))
+        self.car: Car = room[0]
         self.dt = self.car.dt
         self.reset()
 
@@ -257,72 +263,3 @@ def _vector(values: ArrayLike, size: int, what: str) -> Array:
             f"{np.count_nonzero(~np.isfinite(array))} that are not finite"
         )
     return array
-
-
-def _bind(
-    model: mujoco.MjModel, data: mujoco.MjData, tyres: NDArray[np.void], shares: list[float]
-) -> Car:
-    chassis = model.body("chassis").id
-    wheels = [model.body(f"wheel_{w}").id for w in WHEELS]
-    travels = [model.joint(f"travel_{w}").id for w in WHEELS]
-    spins = [model.joint(f"spin_{w}").id for w in WHEELS]
-    sensors = [
-        model.sensor_adr[model.sensor(CHANNEL[name].sensor).id] + CHANNEL[name].axis
-        for name in OUTPUTS
-    ]
-    hubs = np.array([model.body_pos[model.body_parentid[wheel]] for wheel in wheels])
-    # MuJoCo takes the inertial frame for the body frame where the file has them equal.
-    model.body_sameframe[chassis] = 0
-    axes = np.empty(9)
-    mujoco.mju_quat2Mat(axes, model.body_iquat[chassis])
-    turn = axes.reshape(3, 3)
-    inertia = turn @ np.diag(model.body_inertia[chassis]) @ turn.T
-    return new_car(
-        model=model._address,
-        data=data._address,
-        **{name: getattr(data, name).ctypes.data for name in DATA_VIEWS},
-        **{name: getattr(model, name).ctypes.data for name in MODEL_VIEWS},
-        chassis=chassis,
-        wheel=np.arange(len(WHEELS)),
-        wheel_body=np.array(wheels),
-        travel_joint=np.array(travels),
-        travel_qpos=model.jnt_qposadr[travels].astype(np.int64),
-        travel_dof=model.jnt_dofadr[travels].astype(np.int64),
-        spin_qpos=model.jnt_qposadr[spins].astype(np.int64),
-        spin_dof=model.jnt_dofadr[spins].astype(np.int64),
-        sensor=np.array(sensors),
-        dt=float(model.opt.timestep),
-        wheelbase=float(hubs[:2, 0].mean() - hubs[2:, 0].mean()),
-        track=float(hubs[0, 1] - hubs[1, 1]),
-        steering_ratio=float(model.numeric("steering_ratio").data[0]),
-        ackermann=float(model.numeric("ackermann").data[0]),
-        drag_area=float(model.numeric("drag_area").data[0]),
-        torque_share=shares,
-        nominal_torque_share=shares,
-        lift_area=[float(model.numeric(f"lift_area_{axle}").data[0]) for axle in AXLES],
-        axle=[float(hubs[:2, 0].mean()), float(hubs[2:, 0].mean())],
-        bar=bars(model),
-        nominal_tyre=np.array([tyres[name] for name in SCALED_TYRE]),
-        nominal_drag_area=float(model.numeric("drag_area").data[0]),
-        nominal_stiffness=model.jnt_stiffness[travels].copy(),
-        nominal_spring=model.qpos_spring[model.jnt_qposadr[travels]].copy(),
-        nominal_bar=[
-            float(model.tendon_stiffness[bar]) if bar >= 0 else 0.0 for bar in bars(model)
-        ],
-        nominal_damping=model.dof_damping[model.jnt_dofadr[travels]].copy(),
-        spin_inertia=model.body_inertia[wheels, 1].copy(),
-        nominal=np.array(
-            [
-                model.body_mass[chassis],
-                *model.body_ipos[chassis],
-                *np.diag(inertia),
-                *(inertia[0, 1], inertia[0, 2], inertia[1, 2]),
-                *(1.0 for _ in SCALES),
-                *(0.0 for _ in FORCES),
-            ]
-        ),
-        compiled_inertia=np.append(model.body_inertia[chassis], model.body_iquat[chassis]),
-        other_mass=model.body_subtreemass[[0, chassis]] - model.body_mass[chassis],
-        side=np.array([1.0, -1.0, 1.0, -1.0]) * tyres["side"],
-        tyres=table_of(tyres),
-    )

@@ -21,7 +21,7 @@ from scenarios.driving.drivers import DRIVERS
 from scenarios.driving.manoeuvres import Manoeuvre
 from scenarios.driving.record import record
 from scenarios.experiment.result import replacing, versions
-from twin import WHEELS, Drive, Twin, Vehicle
+from twin import SPINS, WHEELS, Drive, Twin, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def _axle(twin: Twin, axle: int, turns: list[Drive], ahead: list[Drive]) -> Axle
     wheels = slice(2 * axle, 2 * axle + 2)
     hubs = twin.data.xpos[twin.car.wheel_body[wheels]]
     track = float(abs(hubs[0, 1] - hubs[1, 1]))
-    radius = float((SPEEDS[1] / twin.read_states()[24:28])[2 * axle])
+    radius = float((SPEEDS[1] / twin.read_states()[SPINS])[2 * axle])
     x = float(twin.car.axle[axle])
     ratio = float(twin.car.steering_ratio) if axle == 0 else math.inf
 
@@ -98,7 +98,7 @@ def _axle(twin: Twin, axle: int, turns: list[Drive], ahead: list[Drive]) -> Axle
         track=track,
         radius=radius,
         roll_share=_roll_share(turns[1], axle),
-        lift_area=float(twin.car.lift_area[axle]),
+        lift_area=float(twin.car[f"lift_area_{'front' if axle == 0 else 'rear'}"]),
         along=_curve(*points(ahead, 0)),
         across=_curve(*points(turns, 1)),
     )
