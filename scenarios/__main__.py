@@ -5,6 +5,7 @@ traceback is a bug of ours.
 """
 
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,12 +13,15 @@ import click
 
 from scenarios.cli import doctor, log_commands, study_commands
 from scenarios.cli.options import Mistake
+from scenarios.cli.output import show_warning
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Runs a command; returns the exit status."""
     try:
-        status = program.main(args, prog_name="til", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = show_warning
+            status = program.main(args, prog_name="til", standalone_mode=False)
     except click.ClickException as error:
         click.echo("til: " + " ".join(_message(error).split()), err=True)
         return error.exit_code

@@ -397,17 +397,61 @@ def by_the_book(t, fz, kappa, alpha, gamma, vx):
     return fx, fy, fz * r0 * mx, -fz * r0 * my * t["lmy"], mz
 
 
-def test_forces_and_moments_are_those_of_the_book():
+def relaxation_by_the_book(t, fz, gamma):
+    """Relaxation lengths of PAC2002, once more."""
+    r0, fz0 = t["unloaded_radius"], t["fnomin"] * t["lfzo"]
+    d = (fz - fz0) / fz0
+    along = fz * (t["ptx1"] + t["ptx2"] * d) * np.exp(-t["ptx3"] * d) * r0 / fz0 * t["lsgkp"]
+    across = t["pty1"] * np.sin(2 * np.arctan(fz / (t["pty2"] * fz0))) * r0 * t["lfzo"]
+    return along, across * (1 - t["pky3"] * abs(gamma * t["lgay"])) * t["lsgal"]
+
+
+# All but those of dimensions and ranges
+FORMULA = TYRE_DTYPE.names[9 : TYRE_DTYPE.names.index("side")]
+
+
+def awake(rng):
+    """A tyre of which no coefficient is 0 and no scaling factor 1."""
+    changes = {name: SUV[name] * rng.uniform(0.9, 1.1) for name in FORMULA}
+    zero = {name: rng.uniform(0.02, 0.1) for name in FORMULA if SUV[name] == 0.0}
+    zero["qsy2"] *= 0.1  # so that a braked wheel still has a resistance
+    return suv(**(changes | zero))
+
+
+def slips_of(rng):
+    """Load, slip ratio, slip angle, inclination, speed."""
+    return rng.uniform((3000.0, -0.15, -0.2, -0.2, 10.0), (9000.0, 0.15, 0.2, 0.2, 40.0))
+
+
+def test_forces_moments_and_relaxation_are_those_of_the_book():
     rng = np.random.default_rng(1)
     for _ in range(300):
-        changes = {
-            name: SUV[name] * rng.uniform(0.9, 1.1) + rng.uniform(0.0, 0.004)
-            for name in TYRE_DTYPE.names[
-                9 : TYRE_DTYPE.names.index("side")
-            ]  # all but those of dimensions and ranges
-        }
-        tyre = suv(**changes)
-        slip = rng.uniform((3000.0, -0.15, -0.2, -0.2, 10.0), (9000.0, 0.15, 0.2, 0.2, 40.0))
+        tyre, slip = awake(rng), slips_of(rng)
         names = ("kappa", "alpha", "gamma", "vx")
         ours = forces(tyre, slip[0], **dict(zip(names, slip[1:], strict=True)))
         np.testing.assert_allclose(ours, by_the_book(tyre, *slip), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            relaxation_lengths(tyre, slip[0], slip[3]),
+            relaxation_by_the_book(tyre, slip[0], slip[3]),
+            rtol=1e-12,
+        )
+
+
+def test_every_coefficient_is_awake_where_the_book_is_compared():
+    rng = np.random.default_rng(2)
+    cases = [(awake(rng), slips_of(rng)) for _ in range(10)]
+
+    def results(tyre, slip):
+        relaxation = relaxation_by_the_book(tyre, slip[0], slip[3])
+        return np.array([*by_the_book(tyre, *slip), *relaxation])
+
+    asleep = set(FORMULA)
+    for tyre, slip in cases:
+        before = results(tyre, slip)
+        for name in sorted(asleep):
+            value = float(tyre[name])
+            tyre[name] = 1.01 * value
+            moved = np.abs(results(tyre, slip) / before - 1.0).max()
+            tyre[name] = value
+            asleep -= {name} if moved > 1e-6 else set()
+    assert asleep == set()

@@ -39,7 +39,7 @@ from twin.channels import (
     X,
     Y,
 )
-from twin.errors import TwinError
+from twin.errors import TwinError, TwinWarning
 from twin.fmu.names import FmuNames
 from twin.logs.drive import Drive
 from twin.noise import noise_sd, with_noise
@@ -128,6 +128,7 @@ __all__ = [
     "TruckTwin",
     "Twin",
     "TwinError",
+    "TwinWarning",
     "U",
     "Vehicle",
     "X",

@@ -16,6 +16,17 @@ def report(result: Result, json_path: Path | None, text: str | None = None) -> N
     save(result.to_json(), json_path)
 
 
+def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    """Shows a warning about a user's file as one line, as errors are shown.
+
+    Args:
+        message: what it says.
+        category: its kind; one that is not about a user's file is named.
+    """
+    kind = "" if category.__name__ == "TwinWarning" else f"{category.__name__}: "
+    click.echo("til: note: " + kind + " ".join(str(message).split()), err=True)
+
+
 def print_table(result: Result, text: str | None = None) -> None:
     """Shows the text, or the rows if there is none, under the result's name."""
     click.echo(f"{result.name} ({result.seconds:.1f} s)\n{text or result.table()}")

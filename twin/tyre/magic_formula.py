@@ -79,6 +79,7 @@ def magic_formula(
 
     kx = _slip_stiffness(tyre, fz, dfz)
     ky = _cornering_stiffness(tyre, fz, nominal, gamma)
+    ratio = tyre.combined * kx / ky
     mu_y = _lateral_friction(tyre, dfz, gamma)
     fx0 = _pure_longitudinal(tyre, fz, dfz, kappa, gamma, kx)
     shift_h, shift_v = _lateral_shifts(tyre, fz, dfz, gamma, ky)
@@ -95,9 +96,9 @@ def magic_formula(
             is_6, weight * _upright_lateral(tyre, fz, dfz, nominal, alpha), fy_weighted
         )
 
-    trail_length = travel * trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, kx / ky)
+    trail_length = travel * trail(tyre, fz, dfz, nominal, kappa, alpha, gamma, ratio)
     residual = residual_torque(
-        tyre, fz, dfz, kappa, alpha, gamma, kx / ky, shift_h + shift_v / ky, ky / (mu_y * fz)
+        tyre, fz, dfz, kappa, alpha, gamma, ratio, shift_h + shift_v / ky, ky / (mu_y * fz)
     )
     arm = force_arm(tyre, dfz, nominal, fy, gamma)
 
@@ -131,7 +132,7 @@ def slip_stiffnesses(tyre: Tyre, fz: float, gamma: float) -> tuple[float, float]
 def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, float]:
     """Returns the relaxation lengths in longitudinal and lateral direction [m], 2 cm or more.
 
-    PAC2002: sigma_kappa = F_z (p_Tx1 + p_Tx2 df_z) exp(p_Tx3 df_z) R_0/F_z0,
+    PAC2002: sigma_kappa = F_z (p_Tx1 + p_Tx2 df_z) exp(-p_Tx3 df_z) R_0/F_z0,
     sigma_alpha = p_Ty1 sin(2 arctan(F_z/(p_Ty2 F_z0))) (1 - p_Ky3 |gamma|) R_0, both scaled.
     MF 6: slip stiffness over that of the carcass; Besselink et al. 2010, Eqs. (14)-(17).
 
@@ -143,7 +144,7 @@ def relaxation_lengths(tyre: Tyre, fz: float, gamma: float) -> tuple[float, floa
     _, fz, dfz, nominal = _load(tyre, fz)
     inclination = _inclination(tyre, gamma)
     gamma = inclination * tyre.lgay
-    along = fz * (tyre.ptx1 + tyre.ptx2 * dfz) * exp(tyre.ptx3 * dfz) / nominal
+    along = fz * (tyre.ptx1 + tyre.ptx2 * dfz) * exp(-tyre.ptx3 * dfz) / nominal
     across = tyre.pty1 * sin_2_arctan(fz / (tyre.pty2 * nominal)) * tyre.lfzo
     across *= maximum(1.0 - tyre.pky3 * absolute(gamma), LEAST_SHARE)
     along, across = along * tyre.unloaded_radius, across * tyre.unloaded_radius

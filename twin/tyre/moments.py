@@ -62,15 +62,15 @@ def overturning_moment(tyre, fz, nominal, fy, gamma):
     """Returns M_x [N m]. (4.E69)."""
     side = fy / nominal
     share = tyre.qsx1 * tyre.lvmx + (tyre.qsx3 * side - tyre.qsx2 * gamma) * tyre.lmx
-    is_6 = tyre.mf6 > 0.0
-    if anywhere(is_6):  # q_Sx12 to q_Sx14: equation manual of MF-Tyre 6.1.2
+    further = tyre.further_mx > 0.0
+    if anywhere(further):  # q_Sx12 to q_Sx14: equation manual of MF-Tyre 6.1.2
         load = fz / nominal
         wave = sin(tyre.qsx7 * gamma + tyre.qsx8 * atan(tyre.qsx9 * side))
         size = absolute(gamma)
         more = tyre.qsx4 * cos(tyre.qsx5 * atan((tyre.qsx6 * load) * (tyre.qsx6 * load))) * wave
         more += (tyre.qsx10 * atan(tyre.qsx11 * load) - tyre.qsx12 * size) * gamma
         more += fy / fz * (tyre.qsx13 + tyre.qsx14 * size)
-        share += where(is_6, more * tyre.lmx, 0.0)
+        share += where(further, more * tyre.lmx, 0.0)
     return share * fz * tyre.unloaded_radius
 
 
@@ -88,9 +88,9 @@ def rolling_resistance(tyre, fz, nominal, fx, vx, gamma):
         + tyre.qsy4 * (speed * speed) * (speed * speed)
     )
     load = fz
-    is_6 = tyre.mf6 > 0.0
-    if anywhere(is_6):
+    further = tyre.further_my > 0.0
+    if anywhere(further):
         tilted = (tyre.qsy5 + tyre.qsy6 * fz / nominal) * gamma * gamma
-        share += where(is_6, tilted, 0.0)
-        load = where(is_6, nominal * power(fz / nominal, tyre.qsy7), fz)
+        share += where(further, tilted, 0.0)
+        load = where(further, nominal * power(fz / nominal, tyre.qsy7), fz)
     return maximum(share, 0.0) * load * tyre.unloaded_radius * tyre.lmy

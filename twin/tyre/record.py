@@ -8,7 +8,10 @@ from twin.tyre.tir_keys import REQUIRED, SCALING
 
 TYRE_DTYPE = np.dtype(
     [(key.lower(), np.float64) for keys in (*REQUIRED.values(), SCALING) for key in keys]
-    + [(name, np.float64) for name in ("side", "cammax", "fzmin", "fzmax", *FIELDS, "model")]
+    + [
+        (name, np.float64)
+        for name in ("side", "cammax", "fzmin", "fzmax", "combined", *FIELDS, "model")
+    ]
     + [(field.name, np.float64) for _, fields in MODELS.values() for field in fields],
     align=True,
 )
@@ -17,6 +20,7 @@ TYRE_DTYPE = np.dtype(
 * side: the side it was measured on, +1 left, -1 right;
 * cammax: largest inclination [rad] the coefficients hold for;
 * fzmin, fzmax: least and largest load [N] they hold for;
+* combined: 1, or 0 if driving and cornering do not influence each other;
 * what only MF 6 has, see `twin.tyre.tir_6`;
 * model: its number in `twin.tyre.interface`, 0 for the Magic Formula;
 * what other models have, see their modules.
@@ -28,5 +32,5 @@ def new_tyre() -> np.ndarray:
     tyre = np.zeros(1, TYRE_DTYPE)
     for key in SCALING:
         tyre[key.lower()] = 1.0
-    tyre["side"] = 1.0
+    tyre["side"] = tyre["combined"] = 1.0
     return tyre

@@ -1,4 +1,4 @@
-"""What MF 6.1 and 6.2 have beyond MF 5.2, and how it is brought into one record.
+"""What MF 6.1 and 6.2, and later PAC2002, have beyond MF 5.2, brought into one record.
 
 Inflation pressure is constant in a drive: its terms are worked into the coefficients that they
 multiply, so that the compiled formula has none. Turn slip is left out (a car's wheels turn far
@@ -36,6 +36,18 @@ OPTIONAL = {
     "ROLLING_COEFFICIENTS": {"QSY5": 0.0, "QSY6": 0.0, "QSY7": 1.0, "QSY8": 0.0},
     "ALIGNING_COEFFICIENTS": dict.fromkeys(_words("PPZ1 PPZ2 QDZ10 QDZ11"), 0.0),
 }
+# Of MF 5.2 in later versions of PAC2002: Adams/Tire's manual; implemented in Project Chrono, too
+OPTIONAL_52 = {
+    "VERTICAL": {"QPFZ1": 0.0},
+    "LONGITUDINAL_COEFFICIENTS": dict.fromkeys(_words("PPX1 PPX2 PPX3 PPX4"), 0.0),
+    "OVERTURNING_COEFFICIENTS": dict.fromkeys(
+        _words("QPX1 QSX4 QSX5 QSX6 QSX7 QSX8 QSX9 QSX10 QSX11"), 0.0
+    ),
+    "LATERAL_COEFFICIENTS": dict.fromkeys(_words("PPY1 PPY2 PPY3 PPY4"), 0.0),
+    "ROLLING_COEFFICIENTS": dict.fromkeys(_words("QSY5 QSY6 QSY7 QSY8"), 0.0),
+    "ALIGNING_COEFFICIENTS": dict.fromkeys(_words("QPZ1 QPZ2"), 0.0),
+}
+_NAMES_IN_6 = {"QPFZ1": "PFZ1", "QPX1": "PPMX1", "QPZ1": "PPZ1", "QPZ2": "PPZ2"}
 EXTRA_SCALING = {"LKYC": 1.0, "LKZC": 1.0, "LMUV": 0.0}
 
 _KEPT = _words(
@@ -43,9 +55,10 @@ _KEPT = _words(
     "QSX4 QSX5 QSX6 QSX7 QSX8 QSX9 QSX10 QSX11 QSX12 QSX13 QSX14 "
     "LONGITUDINAL_STIFFNESS LATERAL_STIFFNESS PCFX1 PCFX2 PCFY1 PCFY2"
 )
-FIELDS = ("mf6", "growth", *(key.lower() for key in _KEPT))
-"""Fields of `twin.tyre.record.TYRE_DTYPE` that are 0 in MF 5.2: mf6 is 1, growth [m] what is added
-to the rolling radius, the others are coefficients."""
+FIELDS = ("mf6", "further_mx", "further_my", "growth", *(key.lower() for key in _KEPT))
+"""Fields of `twin.tyre.record.TYRE_DTYPE` that are 0 in plain MF 5.2: mf6 is 1; further_mx and
+further_my are 1 where there are more terms of M_x (from q_Sx4 on) and M_y (from q_Sy5 on); growth
+[m] is added to the rolling radius; the others are coefficients."""
 
 
 def only_in_6() -> dict[str, tuple[str, ...]]:
@@ -67,7 +80,7 @@ def settle(tyre: np.ndarray, values: dict[str, float]) -> None:
     """
     for key in _KEPT:
         tyre[key.lower()] = values[key]
-    tyre["mf6"] = 1.0
+    tyre["mf6"] = tyre["further_mx"] = tyre["further_my"] = 1.0
     tyre["pty2"] = 1.0  # unused, but divided by where tyres of both kinds are computed at once
     tyre["growth"] = tyre["unloaded_radius"] * (values["Q_RE0"] - 1.0)
     # MF 6 scales camber's forces and moments (book, 4.E28, 4.E30, 4.E47), MF 5.2 the angle
@@ -80,6 +93,28 @@ def settle(tyre: np.ndarray, values: dict[str, float]) -> None:
     tyre["lvmx"] *= tyre["lmx"]  # (4.E69)
     if values["INFLPRES"] and values["NOMPRES"]:
         _inflate(tyre, values)
+
+
+def settle_52(tyre: np.ndarray, values: dict[str, float]) -> None:
+    """Completes a record (1,) of MF 5.2 in place with what later versions of PAC2002 added.
+
+    Args:
+        tyre: with the coefficients of MF 5.2.
+        values: by key: LKYG, INFLPRES and NOMPRES [Pa], 0 where unknown, and those of OPTIONAL_52.
+    """
+    v = {key: 0.0 for keys in OPTIONAL.values() for key in keys}
+    v |= {_NAMES_IN_6.get(key, key): value for key, value in values.items()}
+    for key in OPTIONAL_52["OVERTURNING_COEFFICIENTS"]:
+        if key in _KEPT:
+            tyre[key.lower()] = v[key]
+    tyre["further_mx"] = float(v["QSX4"] != 0.0 or v["QSX10"] != 0.0)
+    # there the load's power comes on top of the load itself
+    tyre["qsy5"], tyre["qsy6"], tyre["qsy7"] = v["QSY5"], v["QSY6"], 1.0 + v["QSY7"]
+    tyre["further_my"] = float(any(v[key] != 0.0 for key in ("QSY5", "QSY6", "QSY7")))
+    for key in ("phy3", "pvy3", "pvy4"):
+        tyre[key] *= v["LKYG"]
+    if v["INFLPRES"] and v["NOMPRES"]:
+        _inflate(tyre, v)
 
 
 def _inflate(tyre: np.ndarray, v: dict[str, float]) -> None:

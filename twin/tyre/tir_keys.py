@@ -1,6 +1,6 @@
 """The keys of a tyre property file by section, and the bounds of their numbers."""
 
-from twin.tyre.tir_6 import OPTIONAL, only_in_6
+from twin.tyre.tir_6 import OPTIONAL, OPTIONAL_52, only_in_6
 
 
 def words(text: str) -> tuple[str, ...]:
@@ -38,7 +38,39 @@ RANGES = {
     "INCLINATION_ANGLE_RANGE": ("CAMMIN", "CAMMAX"),
     "VERTICAL_FORCE_RANGE": ("FZMIN", "FZMAX"),
 }
-SECTIONS = {"UNITS", "SCALING_COEFFICIENTS", *REQUIRED, *RANGES, *OPTIONAL, *only_in_6()}
+CONDITIONS = ("TIRE_CONDITIONS", "OPERATING_CONDITIONS", "INFLATION_PRESSURE")
+CURVE = "DEFLECTION_LOAD_CURVE"
+SECTIONS = {
+    *("UNITS", "SCALING_COEFFICIENTS", CURVE, *CONDITIONS),
+    *(*REQUIRED, *RANGES, *OPTIONAL, *OPTIONAL_52, *only_in_6()),
+}
+# Sections about the file itself, the wheel's inertia (the car's file has it), the shape of the
+# carcass on rough roads and the tyre's own oscillations
+QUIET_SECTIONS = {
+    *("MDI_HEADER", "SHAPE", "INERTIA", "CONTACT_PATCH", "INFLATION_PRESSURE_RANGE", "PARAMETER"),
+}
+# Keys that say nothing about forces on a flat road, or only how a solver is to treat the file
+HARMLESS = {
+    "UNITS": words("PRESSURE"),
+    "MODEL": words(
+        "PROPERTY_FILE_FORMAT FITTYP TYPE FUNCTION_NAME VXLOW ROAD_INCREMENT ROAD_DIRECTION "
+        "N_TIRE_STATES MFSAFE1 MFSAFE2 MFSAFE3 HMAX_LOCAL TIME_SWITCH_INTEG SWITCH_INTEG "
+        "USER_SUB_ID FE_METHOD CONTACT_MODEL"
+    ),
+    "DIMENSION": words("ASPECT_RATIO RIM_RADIUS RIM_WIDTH BOTTOMING_RADIUS"),
+    "VERTICAL": words("MC_CONTOUR_A MC_CONTOUR_B TIRE_MASS BOTTOM_OFFST BOTTOM_STIFF"),
+    "STRUCTURAL": words(
+        "YAW_STIFFNESS FREQ_LONG FREQ_LAT FREQ_YAW FREQ_WINDUP DAMP_LONG DAMP_LAT DAMP_YAW "
+        "DAMP_WINDUP DAMP_RESIDUAL DAMP_VLOW Q_BVX Q_BVT PCMZ1"
+    ),
+}
+
+# Coefficients of MF 5.2 that a file need not have, and what stands in for them
+DEFAULTS = {
+    **{"WIDTH": 0.0, "PDX3": 0.0},
+    **{"PTX1": 0.55, "PTX2": 0.05, "PTX3": 0.0, "PTY1": 1.6, "PTY2": 2.0},  # those of suv.tir
+}
+RELAXATION = words("PTX1 PTX2 PTX3 PTY1 PTY2")
 
 POSITIVE = (1e-3, 1e3)
 NOT_NEGATIVE = (0.0, 1e3)
@@ -46,7 +78,10 @@ ANY = (-1e4, 1e4)  # a typing error, not a coefficient, lies outside
 LIMITS = {
     "LFZO": (0.1, 10.0),
     **dict.fromkeys(words("LCX LMUX LKX LCY LMUY LKY"), (0.01, 10.0)),
-    **dict.fromkeys(words("LXAL LYKA LTR LSGKP LSGAL LMY BREFF DREFF FREFF"), NOT_NEGATIVE),
+    **dict.fromkeys(words("LXAL LYKA LTR LSGKP LSGAL LMY"), NOT_NEGATIVE),
+    **dict.fromkeys(words("BREFF DREFF"), NOT_NEGATIVE),
+    "FREFF": (-10.0, 1e3),
+    "LCZ": (0.01, 10.0),
     **dict.fromkeys(words("PDX1 PKX1 PTX1 PDY1 PKY2 PTY1 PTY2 LONGVL"), POSITIVE),
     **dict.fromkeys(words("UNLOADED_RADIUS WIDTH"), (1e-2, 1e1)),
     **dict.fromkeys(words("PCX1 PCY1"), (0.1, 2.0)),  # from 2 on the sliding force turns round
@@ -59,7 +94,7 @@ LIMITS = {
 LIMITS_6 = {
     "PKY4": (0.1, 5.0),
     **dict.fromkeys(words("LONGITUDINAL_STIFFNESS LATERAL_STIFFNESS"), (1e3, 1e8)),
-    **dict.fromkeys(words("INFLPRES NOMPRES"), (1e3, 1e7)),
+    **dict.fromkeys(words("INFLPRES NOMPRES IP IP_NOM"), (1e3, 1e7)),
     "Q_RE0": (0.5, 1.5),
     "QSY7": (-5.0, 5.0),
     "QSY8": (-5.0, 5.0),
