@@ -83,7 +83,7 @@ def test_inspection_shows_channels_what_the_map_does_and_the_checks(tmp_path):
     (tmp_path / "log.csv").write_text("t,a [g],gear\n0,1,P\n0.1,,P\n0.2,1,P\n1,2,D\n")
     text = inspect_log(tmp_path / "log.csv", None)
     assert text.splitlines()[3].split() == ["a", "[g]", "g", "3", "4", "1", "0", "-", "1", "1", "2"]
-    assert 'no number: "P"' in text
+    assert 'gear     "P"' in text
     assert "No checks" in text
     (tmp_path / "map.toml").write_text(
         '[channels.ax]\nname = "a [g]"\n[constants]\nsteering_wheel_angle = 0\n'

@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 
 from twin.logs.csv import read_log
+from twin.logs.log_time import TimeWanted
+from twin.logs.raw_log import Wanted
 
 
 @pytest.fixture
 def read(tmp_path):
     """A function that writes text or bytes as CSV and reads it as a log."""
 
-    def read(content, time=(None, None)):
+    def read(content, name=None, unit=None):
         path = tmp_path / "log.csv"
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return read_log(path, time)
+        return read_log(path, Wanted(TimeWanted(name, unit)))
 
     return read
 
@@ -54,5 +56,5 @@ def test_empty_cells_are_missing_and_text_is_set_aside(read):
 
 
 def test_time_is_what_the_map_says(read):
-    log = read("t,us,a\n0,5,1\n1,6,1\n", time=("us", 1e-6))
+    log = read("t,us,a\n0,5,1\n1,6,1\n", "us", 1e-6)
     np.testing.assert_allclose(log.channels["a"].time, [5e-6, 6e-6], rtol=1e-14)

@@ -212,7 +212,7 @@ def test_log_faster_than_the_drive_is_averaged_not_picked(tmp_path):
         ("[constants]\nax = 0", "constants.ax is unknown"),
         ("[constants]\nroad_height = 0\nroad_height_fl = 0", "constants.road_height_fl is 0"),
         ("follow_speed = true", "follow_speed needs channels.vx"),
-        ("[time]\nunit = 'h'", "time.unit is 'h'; allowed: s, ms"),
+        ("[time]\nunit = 'ticks'", "time.unit is 'ticks'; allowed: s, ms"),
         ("rate = \n", "is no TOML: Invalid value (at line 1, column 8)"),
     ],
 )
@@ -230,14 +230,16 @@ def test_channel_that_the_log_lacks_is_named_with_what_it_has(log):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("t,a\n0,1\n2,1\n1,1\n", "time 't' runs backwards, from 2 to 1 at sample 2"),
-        ("t,a\n0,1\n,1\n1,1\n", "time 't' is nan at sample 1; allowed: finite times"),
+        ("t,a\n0,1\n2,1\n1,1\n", "time 't' runs backwards, from 2 to 1 s at sample 2"),
+        ("t,a\n0,1\n,1\n,1\n", "time 't' is nan at sample 1; allowed: finite times"),
         ("t,a\n0,1\n", "has 1 samples; allowed: at least 2"),
-        ("t,a\n0,1\n1,left\n", "channel 'a', mapped to ax, is no number there but \"left\""),
-        ("t,a\n0,1\n1\n", "cannot be read as CSV: CSV parse error: Expected 2 columns, got 1"),
-        ("t,a,a\n0,1,1\n", "the name 'a' occurs twice"),
-        ("", "is no CSV"),
-        ("t,a\n0,1\n1e300,1\n", "makes at 1000 Hz"),
+        ("t,a\n0,1\n1,left\n", "channel 'a', mapped to ax, cannot be used: it is \"left\""),
+        ("t,a\n0,1\n1\n", "has 1 samples; allowed: at least 2"),
+        ("t,a\n0,1\n1\n2\n", "2 of 3 rows have not the 2 cells of the row of names"),
+        ("t,a,a\n0,1,1\n1,1,1\n", "channel 'a', mapped to ax, occurs twice"),
+        ("x,a\n0,1\n1,1\n", "no column is called time; allowed: [time] with its name"),
+        ("", "is no table of text"),
+        ("t,a\n0,1\n1e10,1\n", "too few for a drive of 1000 Hz"),
     ],
 )
 def test_fault_of_a_log_is_one_line_that_names_it(tmp_path, content, message):

@@ -8,7 +8,7 @@ from scenarios.logs.checks import Check, checks
 from twin import Drive
 from twin.logs.drive import NoDrive
 from twin.logs.formats import format_of
-from twin.logs.raw_log import Channel, RawLog
+from twin.logs.raw_log import Channel, RawLog, Wanted
 from twin.logs.resampling import gaps
 from twin.logs.units import CHANNELS, our_unit
 
@@ -23,7 +23,7 @@ def inspect_log(path: Path, map_path: Path | None) -> str:
         try:
             return _of_drive(path, Drive.load(path))
         except NoDrive:
-            log = format_of(path).read_log(path, (None, None))
+            log = format_of(path).read_log(path, Wanted())
         return _channels(log) + (
             "\n\nNo checks: the log is of another program, and a map (--map) tells its channels."
         )
@@ -31,7 +31,7 @@ def inspect_log(path: Path, map_path: Path | None) -> str:
     from twin.logs.mapped_log import drive_of
 
     log_map = LogMap.load(map_path)
-    log = format_of(path).read_log(path, (log_map.time_name, log_map.time_unit))
+    log = format_of(path).read_log(path, log_map.wanted)
     drive = drive_of(log, log_map)
     done = "\n".join(f"  {line}" for line in drive.settings["log"]["done"])
     return f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive)}"
@@ -54,10 +54,12 @@ def _channels(log: RawLog) -> str:
     header = ("channel", "unit", "rate [Hz]", "samples", "missing", "gaps", "longest gap [s]")
     rows = [(*header, "least", "median", "largest")]
     rows += [(name, *_row(channel)) for name, channel in log.channels.items()]
-    rows += [(name, f"no number: {kind}") for name, kind in log.text.items()]
+    rows += [(name, kind) for name, kind in log.text.items()]
     times = [channel.time for channel in log.channels.values()]
     start, end = min(t[0] for t in times), max(t[-1] for t in times)
     title = f"{log.path}: {len(log.channels)} channels from {start:.6g} to {end:.6g} s"
+    if start > 1e6:  # since 1970, as a rule
+        title += f", {end - start:.6g} s in all"
     return "\n".join([title, *log.notes, _aligned(rows)])
 
 

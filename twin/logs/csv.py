@@ -1,32 +1,29 @@
-"""Logs and drives in CSV: one row of names, perhaps one of units, then numbers."""
+"""Logs and drives as tables of text: CSV, TSV and what loggers call so."""
 
-import csv
-import json
+import io
+import re
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from twin.errors import TwinError
-from twin.logs.raw_log import Array, RawLog, check_file_size, check_size, log_of_table
+from twin.logs.arrow_columns import cleaned
+from twin.logs.raw_log import (
+    Array,
+    Numbers,
+    RawLog,
+    Wanted,
+    check_size,
+    log_of_table,
+)
+from twin.logs.text_file import HEAD, TextFile, open_text
+from twin.logs.text_table import MISSING, WHITESPACE, Layout, cells_of, find_table
 from twin.toml_file import reason
 
 MARK = "# twin_drive "  # what a drive's first line starts with; its metadata follow
-_HEAD = 2**16  # bytes that the rows before the numbers may fill
-_DELIMITERS = (",", ";", "\t")
-_MISSING = ["", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "null", "-"]
-
-
-class _Dialect(NamedTuple):
-    """How a file is written."""
-
-    encoding: str
-    delimiter: str
-    decimal: str
-    skipped: int  # lines before the names
-    names: list[str]
-    units: dict[str, str]  # where a row of units follows the names
-    metadata: str | None
+_HEAD_LINES = 1000  # that may stand before the numbers
+_NULLS = sorted({f for word in MISSING for f in (word, word.upper(), word.capitalize(), "NaN")})
 
 
 def write(path: Path, columns: dict[str, Array], metadata: str) -> None:
@@ -45,153 +42,157 @@ def read_columns(path: Path) -> tuple[dict[str, Array], str | None]:
     Raises:
         TwinError: the file cannot be read.
     """
-    dialect = _dialect(path)
-    if dialect.metadata is None:
+    file = open_text(path)
+    if not (file.lines and file.lines[0].startswith(MARK)):
         return {}, None
-    columns, text = _read(path, dialect)
-    for name, entry in text.items():
+    found = _numbers(path, file, _layout(path, file, frozenset()))
+    for name, entry in found.text.items():
         raise TwinError(f"{path}: column {name} has the entry {entry}; allowed: numbers")
-    return columns, dialect.metadata
+    for name, bad in found.bad.items():
+        raise TwinError(f"{path}: column {name} has text in {bad.sum()} rows; allowed: numbers")
+    for note in found.notes:
+        raise TwinError(f"{path}: is a damaged drive: {note}")
+    columns = {name: column.values for name, column in found.columns.items()}
+    return columns, file.lines[0].removeprefix(MARK)
 
 
-def read_log(path: Path, time: tuple[str | None, float | None]) -> RawLog:
-    """A log of anybody; `time` as in `twin.logs.raw_log.log_of_table`.
+def read_log(path: Path, wanted: Wanted) -> RawLog:
+    """A log of anybody.
 
-    Commas, semicolons and tabs may stand between the columns, a decimal comma where it is no
-    comma; lines before the names start with #; a row of units may follow the names.
+    Commas, semicolons, tabs, bars or spaces may stand between the columns, and decimal commas where
+    the columns are not separated by commas. `twin.logs.text_table` says what may stand before the
+    numbers. Cells and rows that are damaged are left out and counted.
 
     Raises:
         TwinError: the file cannot be read.
     """
-    dialect = _dialect(path)
-    columns, text = _read(path, dialect)
-    return log_of_table(path, columns, dialect.units, text, time)
+    file = open_text(path)
+    layout = _layout(path, file, wanted.names | {wanted.time.name or ""})
+    return log_of_table(path, _numbers(path, file, layout), wanted.time)
 
 
-def _dialect(path: Path) -> _Dialect:
-    check_file_size(path)
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
-    except OSError as error:
-        raise TwinError(f"{path}: cannot be read: {reason(error)}") from error
-    encoding, text = _decoded(head)
-    if "\0" in text:
-        raise TwinError(f"{path}: is no CSV: it has null characters; allowed: text")
-    lines = text.splitlines()
-    if len(head) == _HEAD:
-        lines = lines[:-1]  # may be cut
-    metadata = lines[0].removeprefix(MARK) if lines and lines[0].startswith(MARK) else None
-    skipped = 0
-    while skipped < len(lines) and (not lines[skipped].strip() or lines[skipped][0] == "#"):
-        skipped += 1
-    if skipped + 2 > len(lines):
+def _layout(path: Path, file: TextFile, names: frozenset[str]) -> Layout:
+    found = find_table(file.lines[:_HEAD_LINES], names - {""})
+    if found is None:
         raise TwinError(
-            f"{path}: is no CSV: it needs a row of names within the first {_HEAD} bytes and two "
-            "of numbers"
+            f"{path}: is no table of text: allowed: a row of names within the first {HEAD} bytes "
+            "and rows of numbers below it"
         )
-    delimiter = max(_DELIMITERS, key=lines[skipped].count)
-    names = [name.strip() for name in _cells(lines[skipped], delimiter)]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise TwinError(f"{path}: the name {repeated[0][:40]!r} occurs twice; allowed: once")
-    after = [_cells(line, delimiter) for line in lines[skipped + 1 : skipped + 20]]
-    decimal = "," if delimiter != "," and _has_decimal_comma(after) else "."
-    units = {}
-    if not any(_is_number(cell) for cell in after[0]) and any(after[0]):
-        units = {name: unit.strip(" []()") for name, unit in zip(names, after[0], strict=False)}
-    return _Dialect(encoding, delimiter, decimal, skipped, names, units, metadata)
+    return found
 
 
-def _decoded(head: bytes) -> tuple[str, str]:
-    """The encoding and the text; a character cut at the end does not count."""
-    try:
-        return "utf-8", head.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        if len(head) == _HEAD and error.start > _HEAD - 4:
-            return "utf-8", head[: error.start].decode("utf-8-sig")
-        return "latin-1", head.decode("latin-1")
+def _numbers(path: Path, file: TextFile, layout: Layout) -> Numbers:
+    """All columns of the table, cleaned."""
+    notes = list(file.notes)
+    if layout.left_out:
+        notes.append(f"{layout.left_out} rows between the names and the numbers are left out.")
+    table, wrong = _table(path, file, layout)
+    if wrong:
+        if len(wrong) > max(table.num_rows, 1):
+            raise TwinError(
+                f"{path}: {len(wrong)} of {len(wrong) + table.num_rows} rows have not the "
+                f"{len(layout.names)} cells of the row of names; allowed: a table"
+            )
+        notes.append(
+            f"{len(wrong)} rows that have not {len(layout.names)} cells are left out, first "
+            f"{wrong[0][:40]!r}."
+        )
+    columns, text, bad = {}, {}, {}
+    for name, arrow in zip(layout.names, table.columns, strict=True):
+        found = cleaned(arrow, commas=layout.delimiter != ",")
+        if found.column is None:
+            text[name] = found.text
+        else:
+            columns[name] = found.column._replace(unit=layout.units.get(name, ""))
+        if found.bad is not None:
+            bad[name] = found.bad
+    _check_padding(path, layout, columns, text)
+    return Numbers(columns, text, bad, layout.repeated, tuple(notes))
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    try:
-        return next(csv.reader([line], delimiter=delimiter), [])
-    except csv.Error:
-        return line.split(delimiter)
+def _check_padding(
+    path: Path, layout: Layout, columns: dict[str, Any], text: dict[str, str]
+) -> None:
+    """Refuses rows of numbers that have one cell more than there are names, unless it is empty."""
+    if not layout.padded:
+        return
+    last = layout.names[-1]
+    if text.pop(last, "empty") != "empty" or np.isfinite(columns[last].values).any():
+        raise TwinError(
+            f"{path}: the rows of numbers have {len(layout.names)} cells, the row of names "
+            f"{len(layout.names) - 1}; allowed: as many"
+        )
+    columns.pop(last, None)
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.strip().replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def _has_decimal_comma(rows: list[list[str]]) -> bool:
-    return any("," in cell and _is_number(cell) for row in rows for cell in row)
-
-
-def _read(path: Path, dialect: _Dialect) -> tuple[dict[str, Array], dict[str, str]]:
-    """The numeric columns, and the first entry that is no number of each other one."""
+def _table(path: Path, file: TextFile, layout: Layout) -> tuple[Any, list[str]]:
+    """The table as Arrow's, and the rows that have another number of cells."""
     import pyarrow as pa
     from pyarrow import csv as pa_csv
 
-    try:
-        table = pa_csv.read_csv(
-            str(path),
-            read_options=pa_csv.ReadOptions(
-                encoding=dialect.encoding,
-                column_names=dialect.names,
-                skip_rows=dialect.skipped + 1 + bool(dialect.units),
-            ),
-            parse_options=pa_csv.ParseOptions(delimiter=dialect.delimiter),
-            convert_options=pa_csv.ConvertOptions(
-                decimal_point=dialect.decimal,
-                null_values=_MISSING,
-                true_values=["true", "True", "TRUE"],
-                false_values=["false", "False", "FALSE"],
-            ),
-        )
-    except (OSError, ValueError, pa.ArrowException) as error:
-        raise TwinError(f"{path}: cannot be read as CSV: {reason(error)[:200]}") from error
-    check_size(path, table.num_rows * table.num_columns, "has")
-    columns, text = {}, {}
-    for name, column in zip(dialect.names, table.columns, strict=True):
-        values = numbers(column)
-        if values is None:
-            text[name] = _first_text(column)
-        else:
-            columns[name] = values
-    return columns, text
+    wrong: list[str] = []
+
+    def leave_out(row: Any) -> str:
+        wrong.append(str(row.text))
+        return "skip"
+
+    for encoding in dict.fromkeys((file.encoding, "latin-1")):
+        wrong.clear()
+        try:
+            with _from_first_row(path, file, layout) as content:
+                table = pa_csv.read_csv(
+                    content,
+                    read_options=pa_csv.ReadOptions(
+                        encoding=encoding, column_names=list(layout.names)
+                    ),
+                    parse_options=pa_csv.ParseOptions(
+                        delimiter=_delimiter(layout), invalid_row_handler=leave_out
+                    ),
+                    convert_options=pa_csv.ConvertOptions(null_values=_NULLS),
+                )
+            check_size(path, table.num_rows * table.num_columns, "has")
+            return table, wrong
+        except OSError as error:
+            raise TwinError(f"{path}: cannot be read: {reason(error)[:200]}") from error
+        except (ValueError, pa.ArrowException):
+            continue
+    return _line_by_line(path, file, layout)
 
 
-def numbers(column: Any) -> Array | None:
-    """A column of Arrow as floats, NaN where nothing is; None if it holds no numbers."""
+def _delimiter(layout: Layout) -> str:
+    return "\t" if layout.delimiter == WHITESPACE else layout.delimiter
+
+
+def _from_first_row(path: Path, file: TextFile, layout: Layout) -> Any:
+    """A binary file that starts at the first row of numbers."""
+    start = file.offsets[layout.first]
+    if file.body is None and layout.delimiter != WHITESPACE:
+        content = path.open("rb")
+        content.seek(start)
+        return content
+    body = file.body if file.body is not None else path.read_bytes()
+    body = body[start:]
+    if layout.delimiter == WHITESPACE:
+        body = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", body)
+        body = re.sub(rb"[ \t]+", b"\t", body)
+    return io.BytesIO(body)
+
+
+def _line_by_line(path: Path, file: TextFile, layout: Layout) -> tuple[Any, list[str]]:
+    """The same for what Arrow does not read, as a last row that ends within quotes."""
     import pyarrow as pa
 
-    kind = column.type
-    if pa.types.is_timestamp(kind):
-        ticks = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]
-        return ticks * column.cast(pa.int64()).to_numpy().astype(np.float64)
-    is_number = (
-        pa.types.is_integer(kind)
-        or pa.types.is_floating(kind)
-        or pa.types.is_boolean(kind)
-        or pa.types.is_null(kind)
-    )
-    if not is_number:
-        return None
-    if pa.types.is_boolean(kind):
-        column = column.cast(pa.int8())
-    if kind != pa.float64():
-        column = column.cast(pa.float64(), safe=False)
-    return column.to_numpy()
-
-
-def _first_text(column: Any) -> str:
-    for entry in column:
-        text = str(entry.as_py())
-        if entry.is_valid and not _is_number(text):
-            return json.dumps(text[:20], ensure_ascii=False)
-    return str(column.type)
+    wrong: list[str] = []
+    rows: list[list[str]] = []
+    with _from_first_row(path, file, layout) as content:
+        for raw in io.TextIOWrapper(content, encoding=file.encoding, errors="replace"):
+            line = raw.rstrip("\r\n")
+            cells = cells_of(line, _delimiter(layout))
+            if len(cells) == len(layout.names):
+                rows.append(cells)
+                check_size(path, len(rows) * len(layout.names), "has")
+            elif line.strip():
+                wrong.append(line)
+    columns = zip(*rows, strict=True) if rows else [()] * len(layout.names)
+    arrays = [pa.chunked_array([pa.array(column, pa.string())]) for column in columns]
+    return pa.table(arrays, names=[str(i) for i in range(len(arrays))]), wrong

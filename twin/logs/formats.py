@@ -9,6 +9,7 @@ from twin.errors import TwinError
 FORMATS = {
     ".parquet": "twin.logs.parquet",
     ".csv": "twin.logs.csv",
+    **dict.fromkeys((".txt", ".tsv", ".log", ".dat"), "twin.logs.csv"),
     ".mf4": "twin.logs.mdf",
 }
 

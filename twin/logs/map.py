@@ -5,9 +5,9 @@
     longest_gap = 0.1       # up to so many seconds are interpolated
     follow_speed = false    # true: no torques in the log, the twin follows the measured vx
 
-    [time]                  # CSV and Parquet; MDF has times of its own
-    name = "t"
-    unit = "s"
+    [time]                  # tables; MDF, MCAP and ROS 2 bags have times of their own
+    name = "t"              # by default the column that is called time, or declared to be it
+    unit = "s"              # by default the one that the log gives; none for timestamps
 
     [channels.ax]           # an input or measurement of ours
     name = "LongAcc"        # the log's channel
@@ -32,7 +32,9 @@ from pathlib import Path
 
 from twin.channels import FURTHER_OUTPUTS, INPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
-from twin.logs.units import UNITS, kind_of
+from twin.logs.log_time import TimeWanted
+from twin.logs.raw_log import Wanted
+from twin.logs.units import UNITS, in_si, kind_of
 from twin.toml_file import Table, read_toml
 
 TORQUES = tuple(name for name in INPUTS if "torque" in name)
@@ -116,9 +118,7 @@ class LogMap:
             longest_gap=table.number("longest_gap", 0.1, 0.0, 1e3),
             follow_speed=table.flag("follow_speed"),
             time_name=time.text("name"),
-            time_unit=UNITS["time"][time.choice("unit", "s", UNITS["time"])]
-            if "unit" in time
-            else None,
+            time_unit=_time_unit(time),
             channels=_sources(table.table("channels"), allowed, axes),
             truth=_sources(table.table("truth"), MEASURABLE, axes),
             constants=_constants(table.table("constants")),
@@ -127,9 +127,28 @@ class LogMap:
         return log_map
 
     @property
+    def wanted(self) -> Wanted:
+        """What the reader of a log has to know of the map."""
+        sources = (*self.channels.values(), *self.truth.values())
+        return Wanted(
+            TimeWanted(self.time_name, self.time_unit), frozenset(s.name for s in sources)
+        )
+
+    @property
     def input_names(self) -> tuple[str, ...]:
         """Inputs of the drive: all of ours, or all but the torques."""
         return tuple(name for name in INPUTS if not (self.follow_speed and name in TORQUES))
+
+
+def _time_unit(table: Table) -> float | None:
+    """Seconds that one of the time's numbers is; None if the map does not say."""
+    unit = table.text("unit")
+    if unit is None:
+        return None
+    factor = in_si("time", unit)
+    if factor is None:
+        table.refuse("unit", f"{', '.join(UNITS['time'])}, or a number of them as in '10 ms'")
+    return factor
 
 
 def _sources(table: Table, allowed: tuple[str, ...], axes: str) -> dict[str, Source]:
@@ -182,14 +201,19 @@ def unit_in_si(channel: str, unit: str, radius: float | None) -> float:
     Raises:
         TwinError: no such unit for this channel; the message starts after its name.
     """
-    units = dict(UNITS[kind_of(channel)])
-    if channel.startswith("wheel_speed"):
-        units |= {name: si / radius if radius else 0.0 for name, si in UNITS["speed"].items()}
-    if unit not in units:
+    kind = kind_of(channel)
+    scale = in_si(kind, unit)
+    if scale is None and channel.startswith("wheel_speed"):
+        scale = in_si("speed", unit)
+        if scale is not None and not radius:
+            raise TwinError(
+                f"is {unit!r}, which needs the wheel's radius; allowed: radius = a number"
+            )
+        scale = scale / radius if scale is not None and radius else None
+    if scale is None:
+        units = (*UNITS[kind], *(UNITS["speed"] if channel.startswith("wheel_speed") else ()))
         raise TwinError(f"is {unit[:40]!r}; allowed: {', '.join(units)}")
-    if units[unit] == 0.0:
-        raise TwinError(f"is {unit!r}, which needs the wheel's radius; allowed: radius = a number")
-    return units[unit]
+    return scale
 
 
 def _constants(table: Table) -> dict[str, float]:

@@ -15,6 +15,7 @@ from twin.logs.resampling import FASTER, gaps, resample
 from twin.logs.units import our_unit
 
 _SPEED = "vx or the wheel speeds"
+_MOST_BETWEEN = 100_000  # samples of a drive between two of its log; chosen: one in 100 s
 # What an estimate needs at least; a constant input tells nothing. Chosen after what the laws of
 # the studies compare, and what moves it.
 NEEDS = {
@@ -38,14 +39,14 @@ def load_drive(path: str | Path, map_path: str | Path) -> Drive:
     and what cannot be estimated.
 
     Args:
-        path: CSV, Parquet or MDF 4.
+        path: of any format of `twin.logs.formats`.
         map_path: see `twin.logs.map`.
 
     Raises:
         TwinError: the log or the map is missing or broken, they do not fit, or an input has gaps.
     """
     log_map = LogMap.load(map_path)
-    log = format_of(path).read_log(Path(path), (log_map.time_name, log_map.time_unit))
+    log = format_of(path).read_log(Path(path), log_map.wanted)
     return drive_of(log, log_map)
 
 
@@ -96,9 +97,14 @@ def drive_of(log: RawLog, log_map: LogMap) -> Drive:
 
 def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
     """A channel of the log in our unit, sign and time."""
+    if source.name in log.repeated:
+        raise TwinError(
+            f"{log.path}: channel {source.name[:40]!r}, mapped to {name}, occurs twice; allowed: "
+            "a name that occurs once"
+        )
     if source.name not in log.channels:
         if source.name in log.text:
-            has = f"is no number there but {log.text[source.name]}"
+            has = f"cannot be used: it is {log.text[source.name]}"
         else:
             has = f"is not there; it has {listed(log.channels)}"
         raise TwinError(f"{log.path}: channel {source.name[:40]!r}, mapped to {name}, {has}")
@@ -131,6 +137,13 @@ def _grid(log: RawLog, log_map: LogMap, ours: Mapping[str, Channel]) -> Array:
         raise TwinError(
             f"{log.path}: all inputs are there from {start:g} to {end:g} s only; allowed: at least "
             f"two samples at {log_map.rate:g} Hz"
+        )
+    samples = sum(channel.time.size for channel in ours.values()) / len(ours)
+    if steps > _MOST_BETWEEN * samples:
+        raise TwinError(
+            f"{log.path}: has {samples:.0f} samples a channel in {end - start:.6g} s, too few for "
+            f"a drive of {log_map.rate:g} Hz; is the unit of time right? allowed: one in "
+            f"{_MOST_BETWEEN / log_map.rate:g} s, or another rate in the map"
         )
     columns = len(OUTPUTS) + len(log_map.channels) + len(log_map.truth) + len(log_map.constants)
     check_size(log.path, int(min(steps, 1e18)) * columns, f"makes at {log_map.rate:g} Hz")

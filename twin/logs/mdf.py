@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 
 from twin.errors import TwinError
+from twin.logs.log_time import spread
 from twin.logs.mdf_check import check_mdf
-from twin.logs.raw_log import Array, Channel, RawLog, check_time
-from twin.logs.units import CHANNELS, our_unit
+from twin.logs.raw_log import Array, Channel, RawLog, Wanted, check_time
+from twin.logs.units import CHANNELS, in_si, our_unit
 from twin.toml_file import reason
 
+_TIME = 1  # type of synchronisation of a master, ASAM MDF 4.1, section 5.17
+_SYNC = {0: "no kind", 2: "angle", 3: "distance", 4: "index"}
 _MARK = "twin_drive "  # what the comment of a drive's header starts with; its metadata follow
 
 
@@ -69,13 +72,16 @@ def read_columns(path: Path) -> tuple[dict[str, Array], str | None]:
     return columns, comment.removeprefix(_MARK)
 
 
-def read_log(path: Path, time: tuple[str | None, float | None]) -> RawLog:
+def read_log(path: Path, wanted: Wanted) -> RawLog:
     """A log of anybody, each channel with the time of its group.
+
+    Only a master of time is time: channels of a group without a master, or with one of angle,
+    distance or index, are set aside with that reason.
 
     Raises:
         TwinError: the file cannot be read, or the map names a channel of time.
     """
-    if time != (None, None):
+    if any(given is not None for given in wanted.time):
         raise TwinError(f"{path}: MDF has times of its own; allowed: a map without [time]")
     return _read(path)[0]
 
@@ -99,10 +105,15 @@ def _read(path: Path) -> tuple[RawLog, str]:
     if fault:
         raise TwinError(f"{path}: cannot be read as MDF: {fault}")
     if not channels:
-        raise TwinError(f"{path}: has no numeric channels; allowed: at least one")
+        why = next((text[name] for name in text if "no time" in text[name]), "no numeric channels")
+        raise TwinError(f"{path}: has {why}; allowed: channels with a master of time")
+    notes: dict[str, None] = {}
     for name, channel in channels.items():
         check_time(path, f"time of {name[:40]!r}", channel.time)
-    return RawLog(path=path, channels=channels, text=text), comment
+        time, about = spread(channel.time)
+        channels[name] = Channel(time=time, values=channel.values, unit=channel.unit)
+        notes |= dict.fromkeys(about)
+    return RawLog(path=path, channels=channels, text=text, notes=tuple(notes)), comment
 
 
 def _channels(file: Any) -> tuple[dict[str, Channel], dict[str, str]]:
@@ -113,6 +124,10 @@ def _channels(file: Any) -> tuple[dict[str, Channel], dict[str, str]]:
     for group, index, name in _places(file):
         count[name] += 1
         unique = name if count[name] == 1 else f"{name}.{count[name]}"
+        seconds, why = _time_unit(file, group)
+        if why:
+            text[unique] = why
+            continue
         signal = file.get(group=group, index=index)
         values = np.asarray(signal.samples)
         if values.ndim != 1 or values.dtype.kind not in "iufb":
@@ -123,13 +138,33 @@ def _channels(file: Any) -> tuple[dict[str, Channel], dict[str, str]]:
             values = values.astype(np.float64)
             if signal.invalidation_bits is not None:
                 values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
-            time = np.asarray(signal.timestamps, dtype=np.float64)
+            time = seconds * np.asarray(signal.timestamps, dtype=np.float64)
             channels[unique] = Channel(time=time, values=values, unit=signal.unit)
     return channels, text
 
 
+def _time_unit(file: Any, group: int) -> tuple[float, str]:
+    """Seconds that one of a group's master is, and why it is no time, if it is none."""
+    content = file.groups[group]
+    called = f"channel group {group}"
+    name = str(getattr(content.channel_group, "acq_name", "") or "")
+    called += f" ({name[:40]})" if name else ""
+    master = file.masters_db.get(group)
+    if master is None:
+        return 0.0, f"no time: {called} has no master channel"
+    channel = content.channels[master]
+    if channel.sync_type != _TIME:
+        kind = _SYNC.get(channel.sync_type, f"kind {channel.sync_type}")
+        return 0.0, f"no time: the master {channel.name[:40]!r} of {called} is one of {kind}"
+    unit = str(channel.unit or "").strip() or str(getattr(channel.conversion, "unit", "") or "")
+    factor = in_si("time", unit) if unit else 1.0
+    if factor is None:
+        return 0.0, f"no time: the master of {called} is in {unit[:20]!r}, an unknown unit of time"
+    return factor, ""
+
+
 def _places(file: Any) -> Iterator[tuple[int, int, str]]:
-    """Group, index and name of every channel with samples that is no group's time."""
+    """Group, index and name of every channel with samples that is no group's master."""
     for group, content in enumerate(file.groups):
         master = file.masters_db.get(group)
         for index, channel in enumerate(content.channels):

@@ -1,11 +1,20 @@
 """Logs and drives in Parquet."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 from twin.errors import TwinError
-from twin.logs.csv import numbers
-from twin.logs.raw_log import Array, RawLog, check_file_size, check_size, log_of_table
+from twin.logs.arrow_columns import cleaned
+from twin.logs.raw_log import (
+    Array,
+    Numbers,
+    RawLog,
+    Wanted,
+    check_file_size,
+    check_size,
+    log_of_table,
+)
 from twin.toml_file import reason
 
 METADATA_KEY = b"twin_drive"
@@ -40,26 +49,52 @@ def read_columns(path: Path) -> tuple[dict[str, Array], str | None]:
     return columns, metadata.decode("utf-8", "replace")
 
 
-def read_log(path: Path, time: tuple[str | None, float | None]) -> RawLog:
-    """A log of anybody; `time` as in `twin.logs.raw_log.log_of_table`.
+def read_log(path: Path, wanted: Wanted) -> RawLog:
+    """A log of anybody: time is a column called so, the index of a pandas table or a timestamp.
 
     A column's unit is that of its field's metadata `unit`, where there is one.
 
     Raises:
         TwinError: the file cannot be read.
     """
+    import pyarrow as pa
+
     table = _table(path)
-    columns, text, units = {}, {}, {}
-    for field, column in zip(table.schema, table.columns, strict=True):
-        values = numbers(column)
-        if values is None:
-            text[field.name] = str(field.type)
-        elif field.name in columns:
-            raise TwinError(f"{path}: column {field.name[:40]!r} occurs twice; allowed: once")
+    try:
+        numbers = numbers_of(table)
+    except (ValueError, pa.ArrowException) as error:
+        raise TwinError(f"{path}: cannot be read as Parquet: {reason(error)[:200]}") from error
+    return log_of_table(path, numbers, wanted.time)
+
+
+def numbers_of(table: Any) -> Numbers:
+    """The columns of an Arrow table, cleaned; units and index as its metadata declare them."""
+    index = _index_names(table.schema.metadata or {})
+    names = list(table.column_names)
+    repeated = tuple(sorted({name for name in names if names.count(name) > 1}))
+    columns, text, bad = {}, {}, {}
+    for place, field in enumerate(table.schema):
+        name = field.name
+        while name in columns or name in text:
+            name += " (2)"
+        found = cleaned(table.column(place))
+        unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
+        if found.column is None:
+            text[name] = found.text
         else:
-            columns[field.name] = values
-            units[field.name] = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-    return log_of_table(path, columns, units, text, time)
+            columns[name] = found.column._replace(unit=unit, is_index=field.name in index)
+        if found.bad is not None:
+            bad[name] = found.bad
+    return Numbers(columns, text, bad, repeated)
+
+
+def _index_names(metadata: dict[bytes, bytes]) -> tuple[str, ...]:
+    """Names of the columns that pandas says are the table's index."""
+    try:
+        declared = json.loads(metadata.get(b"pandas", b"{}"))["index_columns"]
+        return tuple(name for name in declared if isinstance(name, str))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return ()
 
 
 def _table(path: Path) -> Any:
@@ -75,7 +110,11 @@ def _table(path: Path) -> Any:
             unpacked = sum(declared.metadata.row_group(i).total_byte_size for i in groups)
             check_size(path, declared.metadata.num_rows * declared.metadata.num_columns, "declares")
             check_size(path, unpacked // 8, "declares")
-            return declared.read()
+            # text may unpack to much more than the file says: each entry once, and codes
+            words = [f.name for f in declared.schema_arrow if str(f.type).endswith("string")]
+            return pq.ParquetFile(
+                file, page_checksum_verification=True, read_dictionary=words
+            ).read()
     except TwinError:
         raise
     except (OSError, ValueError, MemoryError, OverflowError, pa.ArrowException) as error:

@@ -1,21 +1,37 @@
 """A log as its file has it: channels of any name, unit and rate, before they become a `Drive`."""
 
-import re
+import os
+import stat
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import TwinError
+from twin.logs.log_time import Column, TimeWanted, find_time, spread, unit_in
 
 Array = NDArray[np.float64]
 
 # What a log may hold, in bytes and in values of 8 bytes each; chosen: what a PC has room for
 LARGEST_FILE = 2**31
-LARGEST_LOG = 2**28
+LARGEST_LOG = 45_000_000
 
-_UNIT_IN_NAME = re.compile(r".*[\[(]([^\[\]()]+)[\])]\s*$")
+_MOST_WITHOUT_TIME = 0.5  # of the rows of a table; more are no log
+
+
+class Wanted(NamedTuple):
+    """What a map asks of a log.
+
+    Attributes:
+        time: of tables; files whose channels have times of their own take none.
+        names: of the channels that are mapped; empty: all are wanted.
+    """
+
+    time: TimeWanted = TimeWanted()
+    names: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,20 +56,16 @@ class RawLog:
     Attributes:
         path: the file.
         channels: the numeric channels by name.
-        text: names of channels that are not numbers, with their kind or first entry.
+        text: names of channels that cannot be used, with the reason: their kind or first entry.
+        repeated: names that occur more than once, which a map cannot name.
         notes: what the reader decided on its own, in sentences.
     """
 
     path: Path
     channels: dict[str, Channel]
     text: dict[str, str] = field(default_factory=dict)
+    repeated: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-
-
-def unit_in(name: str) -> str:
-    """The unit in brackets at the end of a channel's name, as in "Speed [km/h]"; or nothing."""
-    match = _UNIT_IN_NAME.match(name)
-    return match.group(1).strip() if match else ""
 
 
 def check_size(path: str | Path, values: int, what: str) -> None:
@@ -66,14 +78,18 @@ def check_size(path: str | Path, values: int, what: str) -> None:
 
 
 def check_file_size(path: str | Path) -> None:
-    """Raises TwinError if there is no such file, or it is too large."""
+    """Raises TwinError if there is no such file, it is none to read from, or it is too large."""
     try:
-        size = Path(path).stat().st_size
+        found = Path(path).stat()
     except (OSError, ValueError) as error:
         text = getattr(error, "strerror", None) or str(error)
         raise TwinError(f"{path}: cannot be read: {text}") from error
-    if size > LARGEST_FILE:
-        raise TwinError(f"{path}: has {size:,} bytes; allowed: {LARGEST_FILE:,}")
+    if not stat.S_ISREG(found.st_mode):
+        raise TwinError(f"{path}: is a folder, pipe or device; allowed: a file")
+    if not os.access(path, os.R_OK):
+        raise TwinError(f"{path}: cannot be read: Permission denied")
+    if found.st_size > LARGEST_FILE:
+        raise TwinError(f"{path}: has {found.st_size:,} bytes; allowed: {LARGEST_FILE:,}")
 
 
 def check_time(path: str | Path, name: str, time: Array) -> None:
@@ -88,62 +104,78 @@ def check_time(path: str | Path, name: str, time: Array) -> None:
     if backwards.any():
         row = int(np.argmax(backwards))
         raise TwinError(
-            f"{path}: {name} runs backwards, from {time[row]:.9g} to {time[row + 1]:.9g} at "
+            f"{path}: {name} runs backwards, from {time[row]:.9g} to {time[row + 1]:.9g} s at "
             f"sample {row + 1}; allowed: rising times"
         )
 
 
-def guess_time(path: str | Path, names: list[str]) -> tuple[str, str]:
-    """The name of the time column that nobody named, and a sentence about it."""
-    for name in names:
-        bare = re.sub(r"[\[(].*", "", name).strip().lower()
-        if bare in ("time", "t", "timestamp", "time_s"):
-            return name, f"time is taken from {name!r}."
-    if not names:
-        raise TwinError(f"{path}: has no numeric channels; allowed: a column of time and others")
-    return names[0], f"time is taken from the first column, {names[0]!r}."
+class Numbers(NamedTuple):
+    """A table's columns, read and cleaned.
+
+    Attributes:
+        columns: the numeric ones, of one length.
+        text: of the others, as in `RawLog`.
+        bad: cells that were no number in columns that are, by name and row.
+        repeated: as in `RawLog`.
+        notes: sentences of the reader.
+    """
+
+    columns: dict[str, Column]
+    text: dict[str, str]
+    bad: dict[str, NDArray[np.bool_]]
+    repeated: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
-def log_of_table(
-    path: Path,
-    columns: dict[str, Array],
-    units: dict[str, str],
-    text: dict[str, str],
-    time: tuple[str | None, float | None],
-) -> RawLog:
+def log_of_table(path: Path, table: Numbers, wanted: TimeWanted) -> RawLog:
     """A log whose channels share one column of time.
 
-    Args:
-        path: the file.
-        columns: the numeric columns by name, of one length.
-        units: of columns, where the file has them.
-        text: see `RawLog`.
-        time: name of the time's column and its unit [s]; None where the map does not say.
+    Rows of text among the numbers, as a logger writes its names again, and rows without a time are
+    left out and counted.
 
     Raises:
-        TwinError: no such column, or its times do not rise.
+        TwinError: there is no column of time, or its times do not rise.
     """
-    from twin.logs.units import UNITS
-
-    name, seconds = time
-    notes: tuple[str, ...] = ()
-    if name is None:
-        name, note = guess_time(path, list(columns))
-        notes = (note,)
-    if name not in columns:
-        raise TwinError(
-            f"{path}: has no numeric column {name!r} for time; it has {listed(columns)}"
-        )
-    if seconds is None:
-        seconds = UNITS["time"].get(units.get(name) or unit_in(name), 1.0)
-    check_time(path, f"time {name!r}", columns[name])
-    stamps = columns[name] * seconds
+    notes = list(table.notes)
+    columns = _without_text_rows(table, notes)
+    if not columns:
+        raise TwinError(f"{path}: has no numeric channels; allowed: a column of time and others")
+    name, time, about = find_time(path, columns, wanted, table.text)
+    there = np.isfinite(time)
+    if 0 < there.size - there.sum() <= _MOST_WITHOUT_TIME * there.size:
+        notes.append(f"{there.size - there.sum()} rows without a time are left out.")
+        columns = {key: c._replace(values=c.values[there]) for key, c in columns.items()}
+        time = time[there]
+    check_time(path, f"time {name!r}", time)
+    time, shared = spread(time)
     channels = {
-        column: Channel(time=stamps, values=values, unit=units.get(column) or unit_in(column))
-        for column, values in columns.items()
-        if column != name
+        key: Channel(time=time, values=column.values, unit=column.unit or unit_in(key))
+        for key, column in columns.items()
+        if key != name
     }
-    return RawLog(path=path, channels=channels, text=text, notes=notes)
+    return RawLog(
+        path=path,
+        channels=channels,
+        text=table.text,
+        repeated=table.repeated,
+        notes=(*notes, *about, *shared),
+    )
+
+
+def _without_text_rows(table: Numbers, notes: list[str]) -> Mapping[str, Column]:
+    """The columns without rows that are mostly text; sentences about bad cells."""
+    if not table.bad:
+        return table.columns
+    count = np.sum([mask for mask in table.bad.values()], axis=0)
+    rows = count >= max(2, 0.5 * len(table.columns))
+    if rows.any():
+        notes.append(f"{rows.sum()} rows of text among the numbers are left out.")
+    for name, mask in table.bad.items():
+        cells = int((mask & ~rows).sum())
+        if cells:
+            notes.append(f"{name}: {cells} cells that are no number count as missing.")
+    kept = ~rows
+    return {name: c._replace(values=c.values[kept]) for name, c in table.columns.items()}
 
 
 def listed(names: object, most: int = 12) -> str:
