@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 import models
+from twin.car.geometry import check_geometry
 from twin.car.load import PointMass, RigidBody
 from twin.car.mjcf import read_mjcf, tyre_path
 from twin.car.toml_car import car_spec, car_tyres
@@ -160,6 +161,7 @@ class Vehicle:
                 raise TwinError(
                     f"{self.source}: numeric {name} is {value}; allowed: at least {least}"
                 )
+        check_geometry(self.source, model)
 
     def tyres(self) -> np.ndarray:
         """Coefficients of the four tyres, (4,) records; .tir files beside the MJCF come first.
