@@ -19,6 +19,8 @@ def read_toml(path: str | Path) -> "Table":
         TwinError: the file cannot be read, is too large, or is no TOML.
     """
     try:
+        if Path(path).exists() and not Path(path).is_file():
+            raise TwinError(f"{path}: is a folder, pipe or device; allowed: a file")
         with Path(path).open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:  # ValueError: a null character in the name

@@ -221,7 +221,7 @@ def bench() -> Callable[[], Result]:
     return pkgutil.resolve_name("scenarios.cli.bench:run")
 
 
-def inspection() -> Callable[[Path, Path | None], str]:
+def inspection() -> Callable[[Path, Path | None, str | None], str]:
     """What tells of a log, with a map or without, as text."""
     return pkgutil.resolve_name("scenarios.logs.inspect:inspect_log")
 

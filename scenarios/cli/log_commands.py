@@ -26,9 +26,15 @@ from scenarios.cli.output import report
     metavar="MAP.toml",
     help="Which channels of the log are ours.",
 )
-def inspect(log: Path, map_path: Path | None) -> None:
-    """Show what is in LOG (Parquet, CSV, MDF 4) and check its signs, units and delays."""
-    click.echo(catalogue.inspection()(log, map_path))
+@click.option(
+    "--vehicle", metavar="CAR", help="A car's name or file: steering and torques are checked too."
+)
+def inspect(log: Path, map_path: Path | None, vehicle: str | None) -> None:
+    """Show what is in LOG and check its signs, units and delays.
+
+    Each finding names the line of the map that would mend it.
+    """
+    click.echo(catalogue.inspection()(log, map_path, vehicle))
 
 
 @click.command("new-car")

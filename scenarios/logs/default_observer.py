@@ -37,6 +37,7 @@ class Default(NamedTuple):
     rolling_radius: float  # [m]
     parameters: tuple[str, ...]  # that are estimated
     left_out: tuple[str, ...]  # sentences
+    largest: dict[str, float]  # that a parameter's estimate can be, in either direction
 
 
 def default_observer(
@@ -75,6 +76,7 @@ def default_observer(
         rolling_radius=radius,
         parameters=tuple(law.parameter for law in laws),
         left_out=tuple(left_out),
+        largest={law.parameter: law.largest for law in laws},
     )
 
 

@@ -9,7 +9,7 @@ import json
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,12 @@ from estimators.score import rms_pct
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Result, Row, json_text, replacing, versions
 from scenarios.logs.estimators import ESTIMATORS, Found, unit_of
+from scenarios.logs.findings import Finding, findings
 from scenarios.logs.pieces import lacking, measured, prepared
 from twin import PARAMETERS, Drive, TwinError, Vehicle
 from twin.car.fingerprint import fingerprint
 from twin.logs.mapped_log import NEEDS
+from twin.logs.raw_log import check_file_size
 from twin.toml_file import reason
 
 Array = NDArray[np.float64]
@@ -67,6 +69,7 @@ class Outcome:
         rows: figures.
         done: sentences: what was done with the log, and what cannot be estimated.
         trustworthy: whether the estimates are at the end; None where nobody looked.
+        faults: sentences, each of which makes the estimates not trustworthy.
         kept: whether a run before this one made it.
         error: one line if it failed, else empty.
     """
@@ -76,6 +79,7 @@ class Outcome:
     rows: tuple[Row, ...] = ()
     done: tuple[str, ...] = ()
     trustworthy: bool | None = None
+    faults: tuple[str, ...] = ()
     kept: bool = False
     error: str = ""
 
@@ -123,6 +127,7 @@ def run(
 def observe(task: Task) -> Outcome:
     """One log, if it is not done already: writes timeline, history and, last, the result."""
     try:
+        check_file_size(task.log)
         mark = fingerprint_of(task)
         before = _read(task, mark)
         if before is not None:
@@ -134,6 +139,7 @@ def observe(task: Task) -> Outcome:
             rows=tuple(_rows(task, found)),
             done=(*done, *found.done),
             trustworthy=_at_end(found),
+            faults=found.faults,
         )
         _write_timeline(task, found)
         _write_history(task, found)
@@ -180,7 +186,22 @@ def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
             for quantity, missing in wanted.items()
             if missing
         )
-    return ESTIMATORS[task.estimator](vehicle, log), (*told, *log.done)
+    wrong = findings(max(log.pieces, key=len), vehicle)
+    found = ESTIMATORS[task.estimator](vehicle, log)
+    return _with_findings(found, wrong), (*told, *log.done)
+
+
+def _with_findings(found: Found, wrong: Sequence[Finding]) -> Found:
+    """Nothing is trustworthy of a log whose channels cannot be what its map says."""
+    faults = tuple(str(finding) for finding in wrong if finding.severity == "fault")
+    notes = tuple(str(finding) for finding in wrong if finding.severity != "fault")
+    estimate = found.estimate
+    if faults:
+        nowhere = np.zeros(estimate.time.size, dtype=np.bool_)
+        estimate = replace(estimate, trustworthy=nowhere)
+    return found._replace(
+        estimate=estimate, done=(*found.done, *notes), faults=(*faults, *found.faults)
+    )
 
 
 def _rows(task: Task, found: Found) -> list[Row]:
@@ -277,6 +298,7 @@ def _read(task: Task, mark: str) -> Outcome | None:
             return None
         rows = tuple(Row(**_numbers(row)) for row in content.pop("rows"))
         content |= {"rows": rows, "done": tuple(content["done"]), "kept": True}
+        content["faults"] = tuple(content["faults"])
         return Outcome(**content)
     except (ValueError, TypeError, KeyError):
         return None
@@ -326,4 +348,5 @@ def _as_text(task: Task, outcome: Outcome) -> str:
            False: "AT THE END THE ESTIMATES ARE NOT TRUSTWORTHY"}[outcome.trustworthy]  # fmt: skip
     notes = ", ".join(part for part in (end, kept) if part)
     title = f"{task.log}, {task.estimator}" + (f": {notes}" if notes else "")
-    return "\n".join([title, *(f"  {line}" for line in outcome.done)])
+    lines = [*outcome.done, *(f"NOT TRUSTWORTHY: {fault}" for fault in outcome.faults)]
+    return "\n".join([title, *(f"  {line}" for line in lines)])

@@ -1,6 +1,7 @@
 """The estimators that recorded drives are given to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ class Found(NamedTuple):
         parameters: that were estimated.
         sd: standard deviation at the end, where the estimator knows it.
         done: sentences.
+        faults: sentences, each of which makes the estimates not trustworthy.
     """
 
     drive: Drive
@@ -36,6 +38,7 @@ class Found(NamedTuple):
     parameters: tuple[str, ...]
     sd: dict[str, float]
     done: tuple[str, ...]
+    faults: tuple[str, ...] = ()
 
 
 def til(vehicle: Vehicle, log: Prepared) -> Found:
@@ -56,13 +59,37 @@ def til(vehicle: Vehicle, log: Prepared) -> Found:
         else:
             default.observer.reset(speed)
         estimates.append(default.observer.run(piece))
+    estimate, faults = _off_their_bounds(_joined(estimates), default.largest)
     return Found(
         drive=_joined_drives(log.pieces),
-        estimate=_joined(estimates),
+        estimate=estimate,
         parameters=default.parameters,
         sd=default.observer.parameter_sd(),
         done=default.left_out,
+        faults=faults,
     )
+
+
+def at_bound(values: Array, largest: float) -> NDArray[np.bool_]:
+    """Where an estimate rests on its own bound, in either direction."""
+    return np.abs(values) >= (1.0 - 1e-6) * largest
+
+
+def _off_their_bounds(
+    estimate: Estimate, largest: Mapping[str, float]
+) -> tuple[Estimate, tuple[str, ...]]:
+    """Not trustworthy while a parameter rests on its bound; sentences where one does at the end."""
+    faults = []
+    for name, bound in largest.items():
+        resting = at_bound(estimate[name], bound)
+        if estimate.trustworthy is not None:
+            estimate = replace(estimate, trustworthy=estimate.trustworthy & ~resting)
+        if resting[-1]:
+            faults.append(
+                f"{name} rests on the bound of its estimate, {estimate[name][-1]:.6g} "
+                f"{unit_of(name)}."
+            )
+    return estimate, tuple(faults)
 
 
 def joint(vehicle: Vehicle, log: Prepared) -> Found:

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.logs.checks import Check, checks
-from twin import Drive
+from scenarios.logs.findings import findings
+from twin import Drive, Vehicle
 from twin.logs.drive import NoDrive
 from twin.logs.formats import format_of
 from twin.logs.raw_log import Channel, RawLog, Wanted
@@ -13,15 +14,21 @@ from twin.logs.resampling import gaps
 from twin.logs.units import CHANNELS, our_unit
 
 
-def inspect_log(path: Path, map_path: Path | None) -> str:
+def inspect_log(path: Path, map_path: Path | None, vehicle: str | None = None) -> str:
     """The text that `til inspect` prints.
 
+    Args:
+        path: of the log.
+        map_path: of its map; None: it is a drive of ours.
+        vehicle: name or file of the car, against which steering and torques are checked.
+
     Raises:
-        TwinError: the log or the map cannot be read, or they do not fit.
+        TwinError: the log, the map or the car cannot be read, or they do not fit.
     """
+    car = Vehicle.load(vehicle) if vehicle else None
     if map_path is None:
         try:
-            return _of_drive(path, Drive.load(path))
+            return _of_drive(path, Drive.load(path), car)
         except NoDrive:
             log = format_of(path).read_log(path, Wanted())
         return _channels(log) + (
@@ -34,10 +41,10 @@ def inspect_log(path: Path, map_path: Path | None) -> str:
     log = format_of(path).read_log(path, log_map.wanted)
     drive = drive_of(log, log_map)
     done = "\n".join(f"  {line}" for line in drive.settings["log"]["done"])
-    return f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive)}"
+    return f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive, car)}"
 
 
-def _of_drive(path: Path, drive: Drive) -> str:
+def _of_drive(path: Path, drive: Drive, car: Vehicle | None) -> str:
     names = (*drive.input_names, *drive.output_names)
     channels = {
         name: Channel(
@@ -47,7 +54,7 @@ def _of_drive(path: Path, drive: Drive) -> str:
         )
         for name in names
     }
-    return f"{_channels(RawLog(path=path, channels=channels))}\n\n{_checks(drive)}"
+    return f"{_channels(RawLog(path=path, channels=channels))}\n\n{_checks(drive, car)}"
 
 
 def _channels(log: RawLog) -> str:
@@ -84,10 +91,14 @@ def _row(channel: Channel) -> tuple[str, ...]:
     )
 
 
-def _checks(drive: Drive) -> str:
+def _checks(drive: Drive, car: Vehicle | None) -> str:
     rows = [("check", "correlation", "slope", "unit", "lag [s]", "verdict")]
-    rows += [_shown(check) for check in checks(drive)]
-    return _aligned(rows)
+    rows += [_shown(check) for check in checks(drive, car)]
+    found = findings(drive, car)
+    lines = [f"  {finding}" for finding in found] or ["  nothing that does not fit."]
+    if car is None:
+        lines.append("  Without --vehicle, torques and the steering's unit are not checked.")
+    return "\n".join([_aligned(rows), "", "Findings:", *lines])
 
 
 def _shown(check: Check) -> tuple[str, ...]:

@@ -120,7 +120,14 @@ def _line(sample: Sample, stream: Stream, default: Default) -> str:
             told[f"{name}_sd"] = sd[name]
     told["sideslip"] = math.atan2(states["vy"], max(states["vx"], 1.0))
     told |= {name: states[name] for name in ("vx", "vy", "yaw_rate")}
-    told["trustworthy"] = sample.trustworthy
+    resting = [
+        name
+        for name, bound in default.largest.items()
+        if abs(float(str(told[name]))) >= 0.999 * bound
+    ]
+    told["trustworthy"] = sample.trustworthy and not resting
+    if resting:
+        told["at_bound"] = resting
     if observer.rejected:
         told["rejected"] = list(observer.rejected)
     return json.dumps(told)

@@ -16,6 +16,7 @@
     factor = 1.0            # units per number of the log, for example N m per bar of brake pressure
     offset = 0.0            # what the log shows at zero, in its own numbers
     delay = 0.0             # [s] by which the log is late
+    clock = 1.0             # seconds that one of this channel's lasts, if another clock stamped it
     radius = 0.34           # [m], wheel speeds in km/h only
 
     [truth.sideslip]        # as [channels], of what only scoring may see
@@ -43,7 +44,7 @@ MEASURABLE = (*OUTPUTS, *FURTHER_OUTPUTS)
 TURNED = ("steering_wheel_angle", "ay", "az", "pitch_rate", "yaw_rate", "vy", "sideslip", "pitch")
 
 _KEYS = ("axes", "rate", "longest_gap", "follow_speed", "time", "channels", "truth", "constants")
-_CHANNEL_KEYS = ("name", "unit", "sign", "factor", "offset", "delay", "radius")
+_CHANNEL_KEYS = ("name", "unit", "sign", "factor", "offset", "delay", "clock", "radius")
 _LARGEST = 1e9  # of factors, offsets and constants
 
 
@@ -57,6 +58,7 @@ class Source:
         sign: 1 or -1, the axes' turn included.
         factor, offset: see above.
         delay: [s].
+        clock: seconds that one of the channel's lasts.
         radius: of the wheel [m], that turns a wheel's speed in m/s into rad/s; None: not needed.
     """
 
@@ -66,6 +68,7 @@ class Source:
     factor: float
     offset: float
     delay: float
+    clock: float
     radius: float | None
 
 
@@ -186,6 +189,7 @@ def _source(channel: str, table: Table, axes: str) -> Source:
         factor=factor,
         offset=table.number("offset", 0.0, -_LARGEST, _LARGEST),
         delay=table.number("delay", 0.0, -10.0, 10.0),
+        clock=table.number("clock", 1.0, 0.9, 1.1),
         radius=radius,
     )
 

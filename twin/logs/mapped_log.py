@@ -87,6 +87,7 @@ def drive_of(log: RawLog, log_map: LogMap) -> Drive:
             "log": {
                 "file": log.path.name,
                 "map": log_map.path.name,
+                "rate": _rate(ours),
                 "follow_speed": log_map.follow_speed,
                 "constants": list(log_map.constants),
                 "done": done,
@@ -121,7 +122,9 @@ def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
         raise TwinError(f"{log_map.path}: channels.{name}.unit {error}") from None
     with np.errstate(over="ignore", invalid="ignore"):
         values = source.sign * scale * source.factor * (channel.values - source.offset)
-    return Channel(time=channel.time - source.delay, values=values, unit=unit)
+    start = channel.time[0]
+    time = start + source.clock * (channel.time - start) - source.delay
+    return Channel(time=time, values=values, unit=unit)
 
 
 def _grid(log: RawLog, log_map: LogMap, ours: Mapping[str, Channel]) -> Array:
@@ -160,6 +163,14 @@ def _check_input(log: RawLog, log_map: LogMap, name: str, grid: Array, values: A
         )
 
 
+def _rate(ours: Mapping[str, Channel]) -> float:
+    """Samples a second of the fastest channel that is mapped [Hz]."""
+    spans = [
+        (channel.time.size - 1, channel.time[-1] - channel.time[0]) for channel in ours.values()
+    ]
+    return max((float(steps / span) for steps, span in spans if span > 0.0), default=1.0)
+
+
 def _about_time(grid: Array, log_map: LogMap) -> list[str]:
     return [
         f"The drive lasts from {grid[0]:.6g} to {grid[-1]:.6g} s: {grid.size} samples at "
@@ -179,6 +190,8 @@ def _about_channel(name: str, log_map: LogMap, channel: Channel, values: Array) 
         parts.append(f"less {source.offset:g}")
     if source.radius:
         parts.append(f"over a radius of {source.radius:g} m")
+    if source.clock != 1.0:
+        parts.append(f"its clock stretched by {source.clock:g}")
     if source.delay:
         parts.append(f"brought forward by {source.delay:g} s")
     if rate > FASTER * log_map.rate:
