@@ -279,10 +279,11 @@ def test_stream_goes_on_from_its_state(tmp_path, drive):
     [
         ([], "has no samples"),
         (['{"time": 0, "ax": 1}'], "steering_wheel_angle is missing in the first sample"),
-        (['{"ax": 1}'], "has no time"),
+        (['{"ax": 1}'], "no column is called time"),
         (["{nonsense"], "line 1 is no JSON"),
-        (["time,ax", "1,left"], "ax is 'left' in line 2; allowed: a number"),
-        (["time,ax", "1"], "line 2 has 1 entries; allowed: 2"),
+        (["time,ax", "left,left"], "has no row of names with rows of numbers below it"),
+        (["time,ax", "1"], "has no row of names with rows of numbers below it"),
+        (["time (ticks),ax", "1,1"], "'ticks', an unknown unit of time"),
     ],
 )
 def test_broken_stream_is_one_line(lines, message):

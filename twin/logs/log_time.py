@@ -92,10 +92,24 @@ def is_called_time(name: str) -> bool:
     return words in _NAMES or (head in _NAMES and in_si("time", tail) is not None)
 
 
+class TimeColumn(NamedTuple):
+    """The time of a table.
+
+    Attributes:
+        name: of its column.
+        factor: seconds that one of its numbers is.
+        notes: sentences about the choice.
+    """
+
+    name: str
+    factor: float
+    notes: tuple[str, ...] = ()
+
+
 def find_time(
     path: str | Path, columns: Mapping[str, Column], wanted: TimeWanted, text: Mapping[str, str]
-) -> tuple[str, Array, list[str]]:
-    """Name of the time's column, its values [s], and sentences about it.
+) -> TimeColumn:
+    """The column of time of a table.
 
     Raises:
         TwinError: there is none, more than one, or its unit is not known.
@@ -106,22 +120,22 @@ def find_time(
             raise TwinError(
                 f"{path}: time column {wanted.name[:40]!r} {kind}; {_candidates(columns)}"
             )
-        seconds, notes = _seconds(path, wanted.name, columns[wanted.name], wanted.unit)
-        return wanted.name, seconds, notes
+        return _time(path, wanted.name, columns[wanted.name], wanted.unit)
     found = [name for name, column in columns.items() if column.is_index and _is_time(name, column)]
     found = found or [name for name in columns if is_called_time(name)]
     found = found or [name for name, column in columns.items() if column.declares]
     if not found:
         raise TwinError(f"{path}: no column is called time; {_candidates(columns)}")
-    times = [_seconds(path, name, columns[name], wanted.unit) for name in found]
-    for name, (seconds, _) in zip(found[1:], times[1:], strict=True):
-        if not _agree(times[0][0], seconds):
+    times = [_time(path, name, columns[name], wanted.unit) for name in found]
+    first = times[0].factor * columns[found[0]].values
+    for name, time in zip(found[1:], times[1:], strict=True):
+        if not _agree(first, time.factor * columns[name].values):
             raise TwinError(
                 f"{path}: time may be {found[0][:40]!r} or {name[:40]!r}, which differ; allowed: "
                 "time.name in the map says which"
             )
-    seconds, notes = times[0]
-    return found[0], seconds, notes or [f"Time is taken from {found[0]!r}."]
+    said = times[0].notes or (f"Time is taken from {found[0]!r}.",)
+    return times[0]._replace(notes=said)
 
 
 def _is_time(name: str, column: Column) -> bool:
@@ -157,24 +171,22 @@ def _agree(first: Array, second: Array) -> bool:
     return bool(np.abs(a - b).max() <= max(1.5 * step, 1e-3 * np.ptp(a)))
 
 
-def _seconds(
-    path: str | Path, name: str, column: Column, unit: float | None
-) -> tuple[Array, list[str]]:
-    """A column's values in seconds, and sentences."""
+def _time(path: str | Path, name: str, column: Column, unit: float | None) -> TimeColumn:
+    """A column as the time of its table."""
     if column.declares:
         if unit is not None:
             raise TwinError(
                 f"{path}: time {name[:40]!r} is {column.declares}, which has no other unit; "
                 "allowed: no time.unit in the map"
             )
-        return column.values, []
+        return TimeColumn(name, 1.0)
     if bare(name) in _INDEX_NAMES and unit is None and _is_running_number(column.values):
         raise TwinError(
             f"{path}: time {name[:40]!r} is a running number, not a time; allowed: a column of "
             "time, or time.unit in the map says what one of it lasts"
         )
     if unit is not None:
-        return unit * column.values, []
+        return TimeColumn(name, unit)
     given = column.unit or unit_in(name)
     if not given:
         _, _, given = bare(name).rpartition(" ")
@@ -195,8 +207,10 @@ def _seconds(
             f"allowed: time.unit in the map: {', '.join(UNITS['time'])}"
         )
     if not given:
-        return column.values, [f"Time is taken from {name!r}, which has no unit: as s."]
-    return factor * column.values, [f"Time is taken from {name!r} in {given}."]
+        said = f"Time is taken from {name!r}, which has no unit: as s."
+    else:
+        said = f"Time is taken from {name!r} in {given}."
+    return TimeColumn(name, factor, (said,))
 
 
 def text_as_seconds(cells: list[str]) -> tuple[Array, str] | None:

@@ -140,7 +140,8 @@ def log_of_table(path: Path, table: Numbers, wanted: TimeWanted) -> RawLog:
     columns = _without_text_rows(table, notes)
     if not columns:
         raise TwinError(f"{path}: has no numeric channels; allowed: a column of time and others")
-    name, time, about = find_time(path, columns, wanted, table.text)
+    name, factor, about = find_time(path, columns, wanted, table.text)
+    time = factor * columns[name].values
     there = np.isfinite(time)
     if 0 < there.size - there.sum() <= _MOST_WITHOUT_TIME * there.size:
         notes.append(f"{there.size - there.sum()} rows without a time are left out.")
