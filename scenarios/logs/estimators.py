@@ -61,7 +61,7 @@ def til(vehicle: Vehicle, log: Prepared) -> Found:
         estimates.append(default.observer.run(piece))
     estimate, faults = _off_their_bounds(_joined(estimates), default.largest)
     return Found(
-        drive=_joined_drives(log.pieces),
+        drive=Drive.joined(log.pieces),
         estimate=estimate,
         parameters=default.parameters,
         sd=default.observer.parameter_sd(),
@@ -102,7 +102,7 @@ def joint(vehicle: Vehicle, log: Prepared) -> Found:
         raise TwinError("the joint estimator needs torques; allowed: --estimator til")
     if len(log.pieces) > 1:
         raise TwinError("the joint estimator takes no gaps of this length; allowed: til")
-    piece = _joined_drives(log.pieces)
+    piece = Drive.joined(log.pieces)
     names = measured(log.pieces)
     noise = np.where([name in names for name in OUTPUTS], _noise_sd(piece), np.nan)
     observer = JointObserver(vehicle, noise, JointSettings(parameters=(*LOAD, *SCALES)))
@@ -132,18 +132,6 @@ def _noise_sd(drive: Drive) -> Array:
         bends = np.where(np.isfinite(bends), bends, 0.0)
         found = 1.4826 * np.median(bends, axis=0) / np.sqrt(6.0)
     return np.maximum(found, _LEAST_NOISE)
-
-
-def _joined_drives(pieces: Sequence[Drive]) -> Drive:
-    first = pieces[0]
-    if len(pieces) == 1:
-        return first
-    return first.replace(
-        time=np.concatenate([piece.time for piece in pieces]),
-        inputs=np.concatenate([piece.inputs for piece in pieces]),
-        measurements=np.concatenate([piece.measurements for piece in pieces]),
-        truth={name: np.concatenate([p.truth[name] for p in pieces]) for name in first.truth},
-    )
 
 
 def _joined(estimates: Sequence[Estimate]) -> Estimate:

@@ -90,10 +90,7 @@ def _middle(drive: Drive) -> Drive:
     if len(drive) <= n:
         return drive
     start = (len(drive) - n) // 2
-    part = slice(start, start + n)
-    return drive.replace(
-        time=drive.time[part], inputs=drive.inputs[part], measurements=drive.measurements[part]
-    )
+    return drive[start : start + n]
 
 
 def _of_time(drive: Drive) -> Iterator[Finding]:

@@ -189,11 +189,4 @@ def _from_known_speed(piece: Drive) -> Drive | None:
     first = int(np.argmax(known))
     if not known[first] or first > len(piece) - 2:
         return None
-    if first == 0:
-        return piece
-    return piece.replace(
-        time=piece.time[first:],
-        inputs=piece.inputs[first:],
-        measurements=piece.measurements[first:],
-        truth={name: values[first:] for name, values in piece.truth.items()},
-    )
+    return piece[first:]

@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -18,6 +18,7 @@ from twin.toml_file import reason
 FORMAT_VERSION = 1
 # Samples count as uniform when no step differs by more than this from the mean one, relatively.
 _UNIFORMITY = 1e-6
+_SLOWEST = 1.0  # [m/s]; below it sideslip is computed as at this speed, as its angle means nothing
 
 
 class NoDrive(TwinError):
@@ -116,6 +117,78 @@ class Drive:
         names = ", ".join((*self.input_names, *self.output_names))
         raise TwinError(f"drive: has no channel {name!r}, only {names}")
 
+    @property
+    def sideslip(self) -> NDArray[np.float64]:
+        """(N,) sideslip angle [rad]: the truth's, else the measured one; NaN where none is."""
+        measured = dict(zip(self.output_names, self.measurements.T, strict=True))
+        for known in (self.truth, measured):
+            if "sideslip" in known:
+                return known["sideslip"]
+            if "vx" in known and "vy" in known:
+                return np.arctan2(known["vy"], np.maximum(known["vx"], _SLOWEST))
+        return np.full(len(self), np.nan)
+
+    def __getitem__(self, samples: slice) -> Self:
+        """The drive of some samples, as in `drive[1000:5000]`; with a step, of every so many.
+
+        Raises:
+            TwinError: it is no slice, or fewer than two samples are left.
+        """
+        if not isinstance(samples, slice) or (samples.step or 1) < 1:
+            raise TwinError(f"drive: samples are {samples!r}; allowed: a slice that rises")
+        return self.replace(
+            time=self.time[samples],
+            inputs=self.inputs[samples],
+            measurements=self.measurements[samples],
+            truth={name: values[samples] for name, values in self.truth.items()},
+        )
+
+    def between(self, first: float, last: float) -> Self:
+        """The drive from one time to another [s], both included.
+
+        Raises:
+            TwinError: fewer than two samples are left.
+        """
+        start, end = np.searchsorted(self.time, [first, last], side="left")
+        end += int(end < len(self) and self.time[end] == last)
+        if end - start < 2:
+            raise TwinError(
+                f"drive: has no two samples from {first:g} to {last:g} s; allowed: times from "
+                f"{self.time[0]:g} to {self.time[-1]:g} s"
+            )
+        return self[start:end]
+
+    @classmethod
+    def joined(cls, drives: Sequence["Drive"]) -> "Drive":
+        """Drives of the same channels, one behind the other; the settings are the first one's.
+
+        Truth that one of them lacks is NaN there.
+
+        Raises:
+            TwinError: their channels differ, or one begins before the other ends.
+        """
+        if not drives:
+            raise TwinError("drive: there is nothing to join; allowed: at least one drive")
+        first = drives[0]
+        for drive in drives[1:]:
+            if (drive.input_names, drive.output_names) != (first.input_names, first.output_names):
+                raise TwinError(
+                    f"drive: channels {(*drive.input_names, *drive.output_names)} cannot be joined "
+                    f"to {(*first.input_names, *first.output_names)}; allowed: the same ones"
+                )
+        truth = dict.fromkeys(name for drive in drives for name in drive.truth)
+        return first.replace(
+            time=np.concatenate([drive.time for drive in drives]),
+            inputs=np.concatenate([drive.inputs for drive in drives]),
+            measurements=np.concatenate([drive.measurements for drive in drives]),
+            truth={
+                name: np.concatenate(
+                    [drive.truth.get(name, np.full(len(drive), np.nan)) for drive in drives]
+                )
+                for name in truth
+            },
+        )
+
     def replace(self, **changes: Any) -> Self:
         """A copy with some attributes changed, checked like a new one."""
         return dataclasses.replace(self, **changes)
@@ -169,6 +242,45 @@ class Drive:
             return cls(settings=settings, **_sorted_out(columns))
         except TwinError as error:
             raise TwinError(f"{path}: {error}") from error
+
+    @classmethod
+    def from_frame(cls, frame: Any, map: "str | Path | Mapping[str, Any] | None" = None) -> "Drive":
+        """A drive from a table of Python, by a map as a file would be.
+
+        Args:
+            frame: a frame of pandas (its index may be the time) or polars, a Dataset of xarray, a
+                table of Arrow, a structured array of NumPy, or a dict of arrays.
+            map: a TOML file, see `twin.logs.map`, or its content as a dict; None: the frame is one
+                that `to_frame` made.
+
+        Raises:
+            TwinError: the frame or the map is broken, or they do not fit.
+        """
+        from twin.logs.frames import columns_of, log_of_frame
+
+        if map is not None:
+            from twin.logs.map import LogMap
+            from twin.logs.mapped_log import drive_of
+
+            log_map = LogMap.of(map) if isinstance(map, Mapping) else LogMap.load(map)
+            return drive_of(log_of_frame(frame, log_map.wanted.time), log_map)
+        columns, metadata = columns_of(frame)
+        settings = _settings(metadata) if metadata else {}
+        return cls(settings=settings, **_sorted_out(columns))
+
+    def to_frame(self, kind: str = "pandas") -> Any:
+        """The drive as a table: columns as in a file (`measurement.ax`), the time as the index.
+
+        Args:
+            kind: "pandas", "polars", "xarray", "arrow" or "numpy".
+
+        Raises:
+            TwinError: there is no such kind, or its library is not installed.
+        """
+        from twin.logs.frames import frame_of
+
+        metadata = json.dumps({"version": FORMAT_VERSION, "settings": self.settings})
+        return frame_of(dict(self._columns()), metadata, kind)
 
     def _columns(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
         yield "time", self.time

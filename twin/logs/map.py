@@ -28,8 +28,10 @@ A number v of the log becomes sign * unit * factor * (v - offset). In SAE axes y
 and z down: signs of ay, az, pitch and yaw rate, pitch, v_y, sideslip and hand wheel turn round.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from twin.channels import FURTHER_OUTPUTS, INPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
@@ -108,14 +110,26 @@ class LogMap:
             TwinError: the file is missing or broken, a field is unknown, or an input is neither
                 mapped nor declared.
         """
-        table = read_toml(path)
+        return cls._of_table(read_toml(path))
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "LogMap":
+        """A map from its content, as TOML would have it.
+
+        Raises:
+            TwinError: see `load`.
+        """
+        return cls._of_table(Table("map", "", content))
+
+    @classmethod
+    def _of_table(cls, table: Table) -> "LogMap":
         table.check_keys(_KEYS)
         axes = table.choice("axes", "ISO", ("ISO", "SAE"))
         time = table.table("time")
         time.check_keys(("name", "unit"))
         allowed = (*INPUTS, *MEASURABLE)
         log_map = cls(
-            path=Path(path),
+            path=Path(table.path),
             axes=axes,
             rate=table.number("rate", 1000.0, 1.0, 1e4),
             longest_gap=table.number("longest_gap", 0.1, 0.0, 1e3),
