@@ -11,6 +11,9 @@ FORMATS = {
     ".csv": "twin.logs.csv",
     **dict.fromkeys((".txt", ".tsv", ".log", ".dat"), "twin.logs.csv"),
     ".mf4": "twin.logs.mdf",
+    ".mcap": "twin.logs.mcap",
+    ".mat": "twin.logs.mat",
+    ".vbo": "twin.logs.vbo",
 }
 
 
