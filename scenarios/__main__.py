@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from scenarios.cli import doctor, log_commands, study_commands
+from scenarios.cli import doctor, log_commands, study_commands, weigh_commands
 from scenarios.cli.options import Mistake
 from scenarios.cli.output import show_warning
 
@@ -73,7 +73,12 @@ def program(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (*study_commands.COMMANDS, *log_commands.COMMANDS, doctor.doctor):
+for command in (
+    *study_commands.COMMANDS,
+    *log_commands.COMMANDS,
+    *weigh_commands.COMMANDS,
+    doctor.doctor,
+):
     program.add_command(command)
 
 if __name__ == "__main__":

@@ -109,6 +109,7 @@ _WHEEL_ANGLES = _channels(_wheels("wheel_angle"), "angle")
 _VELOCITY = _channels(("vx", "vy", "vz"), "speed")
 _TRAVEL_RATES = _channels(_wheels("suspension_rate"), "speed")
 _SIDESLIP = _channels(["sideslip"], "angle")
+_PEDAL = _channels(["accelerator_pedal"], "ratio")  # of its travel; pressed, no foot brakes
 
 _FORCES = _channels(("fx", "fy", "fz"), "force")
 _MOMENTS = _channels(("mx", "my", "mz"), "torque")
@@ -116,7 +117,7 @@ _SLIPS = (*_channels(["slip_ratio"], "ratio"), *_channels(["slip_angle", "camber
 
 _INPUTS = (*_STEERING, *_DRIVE, *_BRAKE, *_ROAD)
 _OUTPUTS = (*_ACCELERATIONS, *_RATES, *_WHEEL_SPEEDS)
-_FURTHER_OUTPUTS = (*_VELOCITY[:2], *_SIDESLIP, *_ROTATION[:2], *_TRAVELS)
+_FURTHER_OUTPUTS = (*_VELOCITY[:2], *_SIDESLIP, *_ROTATION[:2], *_TRAVELS, *_PEDAL)
 _STATES = (
     *(*_POSITION, *_ROTATION, *_TRAVELS, *_WHEEL_ANGLES),
     *(*_VELOCITY, *_RATES, *_TRAVEL_RATES, *_WHEEL_SPEEDS),

@@ -241,6 +241,13 @@ def estimate() -> Any:
     return import_module("scenarios.logs.estimate")
 
 
+def weigh() -> tuple[Any, Callable[[str], Any]]:
+    """The module that weighs recorded drives, and what reads the name of a reference."""
+    return import_module("scenarios.weighing.weigh"), pkgutil.resolve_name(
+        "scenarios.weighing.logs:Log"
+    ).parse
+
+
 def estimate_stream() -> Any:
     """The module that observes samples from standard input."""
     return import_module("scenarios.logs.stream")

@@ -44,6 +44,7 @@ UNITS = {
     },
     "pressure": {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0, "psi": 0.0689475729},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254},
+    "ratio": {"1": 1.0, "%": 0.01},
     "time": {
         "s": 1.0,
         "ms": 1e-3,
@@ -90,6 +91,7 @@ _ALIASES = {
         "cm": "centimeter centimetre",
         "in": "inch inches",
     },
+    "ratio": {"%": "percent pct", "1": "- ratio"},
     "time": {
         "s": "sec secs second seconds sek sekunde sekunden unixtime unix epoch posix utcseconds",
         "ms": "msec msecs millis milli millisec millisecs millisecond milliseconds msek",
@@ -114,6 +116,7 @@ _KINDS = {
     **dict.fromkeys(("vx", "vy"), "speed"),
     **dict.fromkeys(("sideslip", "roll", "pitch"), "angle"),
     "suspension_travel": "length",
+    "accelerator_pedal": "ratio",
 }
 
 CHANNELS = (*INPUTS, *OUTPUTS, *FURTHER_OUTPUTS)

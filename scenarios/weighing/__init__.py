@@ -1,0 +1,1 @@
+"""Weighing a car from recorded trips: logs, calibration files, tables and pictures."""
