@@ -3,7 +3,7 @@ import pytest
 from cars import drive_of_other_car
 
 from estimators.ensemble.offline_fit import OfflineFit
-from estimators.identifiability.cramer_rao import limits, sensitivities
+from estimators.identifiability.cramer_rao import cramer_rao, sensitivities
 from twin import OUTPUTS, Twin, TwinError, Vehicle
 
 LOAD = {"mass": 200.0, "cm_x": -0.05, "Jzz": 300.0}
@@ -46,8 +46,8 @@ def test_errors_are_those_that_the_fit_claims(found):
 def test_claimed_deviations_lie_between_the_bounds_with_known_and_with_free_offsets(rich, found):
     drive, sd, speed = rich
     sensitivity = sensitivities(Twin(Vehicle.load("suv")), drive, tuple(LOAD), LOAD, speed=speed)
-    known = limits(tuple(LOAD), sensitivity, sd)
-    free = limits(tuple(LOAD), sensitivity, sd, free_offsets=True)
+    known = cramer_rao(tuple(LOAD), sensitivity, sd)
+    free = cramer_rao(tuple(LOAD), sensitivity, sd, free_offsets=True)
     assert (found.sd[-1] > 0.98 * known.joint).all()
     assert (found.sd[-1] < 1.05 * free.joint).all()
 

@@ -4,12 +4,11 @@ from cars import drive_of_other_car
 from scipy.signal import lfilter
 
 from estimators.ensemble.staged import CM, Stage, StagedObserver, StagedSettings
-from estimators.priors import PRIOR_SD
 from scenarios.driving.joint_drives import mixed
 from scenarios.driving.record import record
 from scenarios.experiment import study
 from scenarios.papers.joint_peers import STAGED_LAWS
-from twin import TwinError, Vehicle, noise_sd, with_noise
+from twin import PARAMETER, TwinError, Vehicle, noise_sd, with_noise
 
 # Short stages for a short drive
 SETTINGS = StagedSettings(mass_seconds=1.5, pitch_seconds=1.0, cm_seconds=4.0)
@@ -65,7 +64,7 @@ def test_staged_observer_finds_mass_and_cm_of_the_load(staged_run):
     # seconds for each, on a car that is wrong in all the rest
     assert staged_run["mass"][-1] == pytest.approx(variation["mass"], rel=0.15)
     for name in CM:
-        assert abs(staged_run[name][-1] - variation[name]) < 0.5 * PRIOR_SD[name]
+        assert abs(staged_run[name][-1] - variation[name]) < 0.5 * PARAMETER[name].prior_sd
     assert (staged_run.sd[-1] < staged_run.sd[0]).all()
 
 

@@ -4,15 +4,15 @@ from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 import twin
-from estimators.joint.observer import FAULT_SD, FAULTS, JointEstimate
-from estimators.priors import PRIOR_SD
+from estimators.joint.observer import JointEstimate
+from estimators.joint.sensor_errors import SENSOR_ERROR, SENSOR_ERRORS
 from scenarios.timeline import timeline
 from scenarios.timeline.inertia import uniform_ellipsoid
 from scenarios.timeline.joint import write_joint_timeline
 
 RATE = 1000  # [Hz]
-ESTIMATED = (*twin.LOAD, *twin.SCALES, *FAULTS)
-P = len(ESTIMATED) - len(FAULTS)
+ESTIMATED = (*twin.LOAD, *twin.SCALES, *SENSOR_ERRORS)
+P = len(ESTIMATED) - len(SENSOR_ERRORS)
 NOMINAL = np.array(
     [
         *(2125.0, -0.1, 0.0, 0.05, 800.0, 3600.0, 3900.0, 0.0, 0.0, 0.0),
@@ -44,7 +44,12 @@ def make(seconds):
         truth=truth,
         settings={},
     )
-    prior = np.array([*(PRIOR_SD[x] for x in ESTIMATED[:P]), *FAULT_SD.values()])
+    prior = np.array(
+        [
+            *(twin.PARAMETER[x].prior_sd for x in ESTIMATED[:P]),
+            *(e.prior_sd for e in SENSOR_ERROR.values()),
+        ]
+    )
     sd = prior * np.exp(0.01 * rng.standard_normal((n, prior.size)))
     parameters = np.zeros((n, len(twin.PARAMETERS)))
     parameters[:, :10] = DELTA
@@ -57,7 +62,7 @@ def make(seconds):
         extended=np.zeros((n, len(twin.EXTENDED))),
         nominal=NOMINAL,
         estimated=ESTIMATED,
-        sensor_error_names=FAULTS,
+        sensor_error_names=SENSOR_ERRORS,
         prior=prior,
         sd=sd,
         valid=np.repeat((time >= FOUND_AT[0])[:, None], prior.size, axis=1),

@@ -61,7 +61,7 @@ from twin.truck.parameters import TruckParameters
 if TYPE_CHECKING:
     from twin.car.vehicle import Vehicle
     from twin.commonroad.twin import CommonRoadTwin
-    from twin.ensemble import Fleet
+    from twin.ensemble import Ensemble
     from twin.fmu.twin import FmuTwin
     from twin.truck.twin import TruckTwin
     from twin.twin import Snapshot, Twin, check_inputs
@@ -69,7 +69,7 @@ if TYPE_CHECKING:
 _COMPILED = {
     "CommonRoadTwin": "twin.commonroad.twin",
     "FmuTwin": "twin.fmu.twin",
-    "Fleet": "twin.ensemble",
+    "Ensemble": "twin.ensemble",
     "Snapshot": "twin.twin",
     "TruckTwin": "twin.truck.twin",
     "Twin": "twin.twin",
@@ -116,7 +116,7 @@ __all__ = [
     "Channel",
     "CommonRoadTwin",
     "Drive",
-    "Fleet",
+    "Ensemble",
     "FmuNames",
     "FmuTwin",
     "P",

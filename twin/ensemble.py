@@ -6,7 +6,7 @@ from twin.errors import TwinError
 from twin.twin import Twin
 
 
-class Fleet:
+class Ensemble:
     """Twins of one vehicle whose cars lie in one array, so that one compiled loop steps them all.
 
     Attributes:
@@ -21,7 +21,7 @@ class Fleet:
 
     def __init__(self, vehicle: Vehicle, size: int) -> None:
         if size < 1:
-            raise TwinError(f"fleet: size is {size}; allowed: at least 1")
+            raise TwinError(f"ensemble: size is {size}; allowed: at least 1")
         self.vehicle = vehicle
         self.cars = new_cars(size)
         self.twins = tuple(Twin(vehicle, self.cars[i : i + 1]) for i in range(size))
@@ -31,4 +31,4 @@ class Fleet:
         return len(self.twins)
 
     def __reduce__(self) -> str:
-        raise TwinError("a Fleet owns memory of MuJoCo and cannot be pickled; send its Vehicle")
+        raise TwinError("an Ensemble owns memory of MuJoCo and cannot be pickled; send its Vehicle")

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from estimators.base import Estimate
 from estimators.ensemble.unscented import BIAS_SD
 from estimators.entry import Entry, Given
-from estimators.priors import OFFSETS, PRIOR_SD, initial_deltas
+from estimators.priors import initial_deltas, prior_sds
 from estimators.til.observer import Observer
-from twin import LOAD, OUTPUTS, PARAMETERS, SCALES, Drive, Twin, TwinError, Vehicle
+from twin import LOAD, OUTPUTS, PARAMETER, PARAMETERS, SCALES, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class OfflineFit:
         vehicle: of the twin.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
         parameters: of `twin.PARAMETERS`, p of them; the others stay as they are at the start.
-        prior_sd: by parameter, instead of `estimators.priors.PRIOR_SD`.
+        prior_sd: by parameter, instead of that of its record.
 
     Raises:
         TwinError: a name or a number is not allowed.
@@ -61,7 +61,7 @@ class OfflineFit:
                 f"fit: parameter {unknown[0]!r} is unknown; allowed: {', '.join(PARAMETERS)}"
             )
         self.estimated = tuple(parameters)
-        prior = PRIOR_SD | dict(prior_sd or {})
+        prior = prior_sds(parameters, prior_sd)
         self._scale = np.array([*(prior[name] for name in parameters), *BIAS_SD])
         self._noise_sd = _checked_noise(np.asarray(noise_sd, dtype=np.float64))
         self._observer = Observer(Twin(vehicle), [])
@@ -174,8 +174,9 @@ class _Problem:
         columns = []
         for i, name in enumerate(self._parameters):
             beside = theta.copy()
-            beside[i] += OFFSETS[name]
-            columns.append((_block_means(self._simulate(beside).outputs) - middle) / OFFSETS[name])
+            step = PARAMETER[name].step
+            beside[i] += step
+            columns.append((_block_means(self._simulate(beside).outputs) - middle) / step)
         biased = np.eye(len(OUTPUTS))[: x.size - theta.size]
         columns += [np.broadcast_to(row, middle.shape) for row in biased]
         pairs = zip(columns, self._scale, strict=True)

@@ -31,15 +31,25 @@ from estimators.ensemble.blocks import new_block
 from estimators.ensemble.staged_kernel import Log, Memory, Setup
 from estimators.ensemble.unscented import BIAS_SD, BLOCK, SPEED_GAIN, STEP
 from estimators.entry import Entry, Given
-from estimators.priors import PRIOR_SD, initial_deltas
+from estimators.priors import initial_deltas
 from estimators.til.law import ParameterLaw, compile_laws
-from twin import OUTPUTS, PARAMETERS, STATES, Drive, Fleet, TwinError, Vehicle, check_inputs
+from twin import (
+    OUTPUTS,
+    PARAMETER,
+    PARAMETERS,
+    STATES,
+    Drive,
+    Ensemble,
+    TwinError,
+    Vehicle,
+    check_inputs,
+)
 
 Array = NDArray[np.float64]
 
 CM = ("cm_x", "cm_y", "cm_z")
 QUASI_STATIC = ("ax", "ay", "roll_rate", "pitch_rate", "yaw_rate")
-PRIOR = np.array([*(PRIOR_SD[name] for name in CM), *BIAS_SD])
+PRIOR = np.array([*(PARAMETER[name].prior_sd for name in CM), *BIAS_SD])
 # Of the yaw rate's low pass [s]; chosen: passes a driver's steering, leaves a tenth of the noise
 YAW_FILTER = 0.1
 LEAST_WHEEL_SPEED = 3.0  # rad/s, 1 m/s, as in the mass law
@@ -116,14 +126,14 @@ class StagedObserver:
         if sorted(named) != ["Jxx", "Jyy", "Jzz", "mass"]:
             raise TwinError(f"staged: laws are of {', '.join(named)}; allowed: mass, Jxx, Jyy, Jzz")
         self.estimated = (*named, *CM)
-        self.fleet = Fleet(vehicle, 1 + len(CM))
+        self.ensemble = Ensemble(vehicle, 1 + len(CM))
         self._setup = _setup(settings, np.asarray(noise_sd, dtype=np.float64), self.dt)
         self._laws = compile_laws(laws, self.dt)
 
     @property
     def dt(self) -> float:
         """Sample time [s]."""
-        return self.fleet.twins[0].dt
+        return self.ensemble.twins[0].dt
 
     def reset(
         self,
@@ -133,8 +143,8 @@ class StagedObserver:
     ) -> None:
         """See `estimators.base.Estimator`."""
         self._memory = _memory(self._laws[1].copy(), initial_deltas(parameters))
-        staged_kernel.set_all(self.fleet.cars, self._memory.theta)
-        for twin in self.fleet.twins:
+        staged_kernel.set_all(self.ensemble.cars, self._memory.theta)
+        for twin in self.ensemble.twins:
             settle(twin, speed, road)
 
     def run(self, drive: Drive) -> StagedEstimate:
@@ -144,17 +154,17 @@ class StagedObserver:
             TwinError: the drive does not fit the twins, or a twin blew up.
         """
         check_inputs(drive.inputs, "drive")
-        fleet, n = self.fleet, len(drive)
+        ensemble, n = self.ensemble, len(drive)
         log = Log(
             states=np.empty((n, len(STATES))),
             parameters=np.empty((n, len(PARAMETERS))),
             outputs=np.empty((n, len(OUTPUTS))),
-            extended=np.empty((n, *fleet.cars[0].tyre_output.shape)),
+            extended=np.empty((n, *ensemble.cars[0].tyre_output.shape)),
             stage=np.empty(n, dtype=np.int64),
             sd=np.empty((n, len(self.estimated))),
         )
         done = staged_kernel.run(
-            fleet.cars, self._setup, self._memory, new_block(len(fleet)), self._laws[0],
+            ensemble.cars, self._setup, self._memory, new_block(len(ensemble)), self._laws[0],
             drive.inputs, drive.measurements, log,
         )  # fmt: skip
         if done < n:
@@ -165,7 +175,7 @@ class StagedObserver:
             parameters=log.parameters,
             outputs=log.outputs,
             extended=log.extended.reshape(n, -1),
-            nominal=fleet.cars[0].nominal.copy(),
+            nominal=ensemble.cars[0].nominal.copy(),
             stage=log.stage,
             estimated=self.estimated,
             sd=log.sd,

@@ -25,20 +25,20 @@ from estimators.ensemble.blocks import (
     move_states,
 )
 from estimators.til.law import advance_law
-from twin import OUTPUTS, PARAMETERS
+from twin import PARAMETER, PARAMETERS, P, Y
 from twin.kernel import is_sound, read_states, set_parameters
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 MASS, PITCH, CM, ROLL_YAW = range(4)
-AX, AY, YAW_RATE = (OUTPUTS.index(name) for name in ("ax", "ay", "yaw_rate"))
-CM_X = PARAMETERS.index("cm_x")  # cm_y and cm_z come after
+AX, AY, YAW_RATE = Y.ax, Y.ay, Y.yaw_rate
+CM_X = P.cm_x  # cm_y and cm_z come after
 # The stage of each parameter that a law corrects; those of the CM have no law
 STAGE_OF = np.array(
     [{"mass": MASS, "Jyy": PITCH, "Jxx": ROLL_YAW, "Jzz": ROLL_YAW}.get(n, -1) for n in PARAMETERS]
 )
-OFFSET = 0.005  # of the CM of each twin [m], as in `estimators.identifiability.cramer_rao`
+OFFSET = PARAMETER["cm_x"].step  # of the CM of each twin [m]
 
 
 class Setup(NamedTuple):

@@ -15,15 +15,17 @@ from estimators.ensemble import unscented_kernel
 from estimators.ensemble.blocks import new_block
 from estimators.ensemble.unscented_kernel import Log, Memory, Setup
 from estimators.entry import Entry, Given
-from estimators.priors import PRIOR_SD, initial_deltas
+from estimators.priors import initial_deltas, prior_sds
 from twin import (
+    CHANNEL,
+    IMU,
     LOAD,
     OUTPUTS,
     PARAMETERS,
     SCALES,
     STATES,
     Drive,
-    Fleet,
+    Ensemble,
     TwinError,
     Vehicle,
     check_inputs,
@@ -31,8 +33,7 @@ from twin import (
 
 Array = NDArray[np.float64]
 
-# Of a cheap IMU [m/s2, rad/s]
-BIAS_SD = (0.1, 0.1, 0.1, 0.005, 0.005, 0.005)
+BIAS_SD = tuple(CHANNEL[name].bias_sd for name in OUTPUTS[IMU])
 # By which the noise's variance is taken larger than it is, for what the regression leaves out
 NOISE_FACTOR = 1.5
 DRIFT = 0.001  # share of its prior sd that an estimate may wander over a second
@@ -50,7 +51,7 @@ class UnscentedObserver:
         vehicle: of the twins.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
         parameters: of `twin.PARAMETERS`; the others stay nominal.
-        prior_sd: by parameter, instead of `estimators.priors.PRIOR_SD`.
+        prior_sd: by parameter, instead of that of its record.
 
     Raises:
         TwinError: a name is unknown or given twice.
@@ -69,14 +70,14 @@ class UnscentedObserver:
                 f"{', '.join(PARAMETERS)}"
             )
         self.estimated = tuple(parameters)
-        self.fleet = Fleet(vehicle, 2 * len(parameters) + 1)
+        self.ensemble = Ensemble(vehicle, 2 * len(parameters) + 1)
         noise = np.asarray(noise_sd, dtype=np.float64)
-        self._setup = _setup(self.fleet, parameters, noise, PRIOR_SD | dict(prior_sd or {}))
+        self._setup = _setup(self.ensemble, parameters, noise, prior_sds(parameters, prior_sd))
 
     @property
     def dt(self) -> float:
         """Sample time [s]."""
-        return self.fleet.twins[0].dt
+        return self.ensemble.twins[0].dt
 
     def reset(
         self,
@@ -86,8 +87,8 @@ class UnscentedObserver:
     ) -> None:
         """See `estimators.base.Estimator`."""
         self._memory = _memory(self._setup, initial_deltas(parameters))
-        unscented_kernel.place(self.fleet.cars, self._setup, self._memory)
-        for twin in self.fleet.twins:
+        unscented_kernel.place(self.ensemble.cars, self._setup, self._memory)
+        for twin in self.ensemble.twins:
             settle(twin, speed, road)
 
     def run(self, drive: Drive) -> Estimate:
@@ -97,16 +98,16 @@ class UnscentedObserver:
             TwinError: the drive does not fit the twins, or a twin has blown up.
         """
         check_inputs(drive.inputs, "drive")
-        fleet, n = self.fleet, len(drive)
+        ensemble, n = self.ensemble, len(drive)
         log = Log(
             states=np.empty((n, len(STATES))),
             parameters=np.empty((n, len(PARAMETERS))),
             outputs=np.empty((n, len(OUTPUTS))),
-            extended=np.empty((n, *fleet.cars[0].tyre_output.shape)),
+            extended=np.empty((n, *ensemble.cars[0].tyre_output.shape)),
             sd=np.empty((n, len(self.estimated))),
         )
         done = unscented_kernel.run(
-            fleet.cars, self._setup, self._memory, new_block(len(fleet)), drive.inputs,
+            ensemble.cars, self._setup, self._memory, new_block(len(ensemble)), drive.inputs,
             drive.measurements, log,
         )  # fmt: skip
         if done < n:
@@ -124,10 +125,10 @@ class UnscentedObserver:
 
 
 def _setup(
-    fleet: Fleet, parameters: Sequence[str], noise_sd: Array, prior_sd: Mapping[str, float]
+    ensemble: Ensemble, parameters: Sequence[str], noise_sd: Array, prior_sd: Mapping[str, float]
 ) -> Setup:
     prior = np.array([*(prior_sd[name] for name in parameters), *BIAS_SD])
-    twin = fleet.twins[0]
+    twin = ensemble.twins[0]
     return Setup(
         column=np.array([PARAMETERS.index(name) for name in parameters], dtype=np.int64),
         prior=prior,

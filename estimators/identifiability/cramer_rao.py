@@ -1,4 +1,4 @@
-"""What a drive can tell of the load at all: the Cramer-Rao bound on each parameter.
+"""Identifiability of the load in a drive: the Cramer-Rao bound on each parameter.
 
 With white sensor noise of standard deviation sd_j and the sensitivities S_i = dy/dp_i of the
 outputs over the whole drive, Fisher's information is
@@ -25,26 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.til.observer import Observer
-from twin import FORCES, PARAMETERS, SCALES, Drive, Twin, TwinError
+from twin import PARAMETER, PARAMETERS, Drive, Twin, TwinError
 
 Array = NDArray[np.float64]
 
-# Where the twin is run beside the given point, to either side [kg, m, kg m2]: a tenth or less of
-# what a full car changes. Large beside rounding (1e-13 of an output), small beside the curvature:
-# over two minutes in town half the offset changes no sensitivity by more than 0.1 %, rms over all
-# channels in units of their noise. Only the instants at which a car comes to a stop are jumps; they
-# change what ax or pitch_rate alone tell of the mass by 3 %.
-OFFSETS = {
-    "mass": 10.0,
-    **dict.fromkeys(("cm_x", "cm_y", "cm_z"), 0.005),
-    **{"Jxx": 10.0, "Jyy": 30.0, "Jzz": 30.0},
-    **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 10.0),
-    **dict.fromkeys(SCALES, 0.01),
-    **dict.fromkeys(FORCES, 100.0),
-}
-
 # Differences are good to some 1e-4 of a sensitivity. Of scaled information, less than the square of
-# that is error: the combination of parameters is not told at all.
+# that is error: the combination of parameters is not identifiable.
 LEAST_INFORMATION = 1e-8
 # Share that a parameter has in such a combination before it counts as touched
 LEAST_SHARE = 1e-6
@@ -67,7 +53,7 @@ def sensitivities(
         parameters: of `twin.PARAMETERS`, p of them.
         at: the deltas around which to differ, by name; zero where not given.
         speed: at the start of the drive [m/s].
-        offsets: by name, instead of `OFFSETS`.
+        offsets: by name, instead of the steps of their records.
 
     Returns:
         (p, N, 10) derivatives [unit of the output over that of the parameter].
@@ -79,7 +65,7 @@ def sensitivities(
     for name in parameters:
         if name not in PARAMETERS:
             raise TwinError(
-                f"limits: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
+                f"cramer_rao: parameter {name!r} is unknown; allowed: {', '.join(PARAMETERS)}"
             )
 
     def outputs(load: Mapping[str, float]) -> Array:
@@ -88,12 +74,17 @@ def sensitivities(
         for name, value in load.items():
             if abs(run[name][0] - value) > 1e-9 * (1.0 + abs(value)):
                 raise TwinError(
-                    f"limits: {name} is {value:g}; allowed: what a rigid body can have, such as "
+                    f"cramer_rao: {name} is {value:g}; allowed: of a rigid body, such as "
                     f"{run[name][0]:g} with the other parameters as they are"
                 )
         return run.outputs
 
-    return central_differences(outputs, parameters, at, OFFSETS | dict(offsets or {}))
+    return central_differences(
+        outputs,
+        parameters,
+        at,
+        {name: PARAMETER[name].step for name in parameters} | dict(offsets or {}),
+    )
 
 
 def central_differences(
@@ -112,14 +103,14 @@ def central_differences(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Limits:
+class CramerRaoBound:
     """The least standard deviations with which p parameters can be estimated.
 
     Attributes:
         parameters: p names.
         information: (p, p) Fisher's, of the parameters in their units.
-        single: (p,) standard deviation if all the others are known; inf: nothing tells of it.
-        joint: (p,) if all of them are unknown; inf: not told apart from the others.
+        single: (p,) standard deviation if all the others are known; inf: not identifiable.
+        joint: (p,) if all of them are unknown; inf: not distinguishable from the others.
         correlation: (p, p) of the errors of the joint estimate; NaN where joint is inf.
     """
 
@@ -131,14 +122,14 @@ class Limits:
 
     @property
     def unidentifiable(self) -> tuple[str, ...]:
-        """Parameters that the channels do not tell, or not apart from each other."""
+        """Parameters that the channels do not identify, or not apart from each other."""
         pairs = zip(self.parameters, self.joint, strict=True)
         return tuple(name for name, sd in pairs if np.isinf(sd))
 
 
-def limits(
+def cramer_rao(
     parameters: Sequence[str], sensitivity: Array, sd: Array, *, free_offsets: bool = False
-) -> Limits:
+) -> CramerRaoBound:
     """The Cramer-Rao bound.
 
     Args:
@@ -155,7 +146,7 @@ def limits(
     used = ~np.isnan(sd)
     scaled = sensitivity[:, :, used] / sd[used]
     if not np.isfinite(scaled).all():
-        raise TwinError("limits: a sensitivity is not finite; allowed: finite numbers")
+        raise TwinError("cramer_rao: a sensitivity is not finite; allowed: finite numbers")
     if free_offsets and scaled.shape[1]:
         scaled = scaled - scaled.mean(axis=1, keepdims=True)  # what an offset leaves to be seen
     flat = scaled.reshape(len(parameters), -1)
@@ -163,7 +154,7 @@ def limits(
     with np.errstate(divide="ignore"):
         single = 1.0 / np.sqrt(np.diag(information))
     joint, correlation = _invert(information, single)
-    return Limits(
+    return CramerRaoBound(
         parameters=tuple(parameters),
         information=information,
         single=single,
@@ -173,9 +164,9 @@ def limits(
 
 
 def _invert(information: Array, single: Array) -> tuple[Array, Array]:
-    """Joint standard deviations and correlations, of as much as is told."""
-    told = np.isfinite(single)
-    scale = np.where(told, single, 0.0)
+    """Joint standard deviations and correlations, of what is identifiable."""
+    seen = np.isfinite(single)
+    scale = np.where(seen, single, 0.0)
     values, vectors = np.linalg.eigh(scale[:, None] * information * scale)
     null = values <= LEAST_INFORMATION
     touched = (vectors[:, null] ** 2).sum(axis=1) > LEAST_SHARE
@@ -189,11 +180,11 @@ def _invert(information: Array, single: Array) -> tuple[Array, Array]:
 def _check(parameters: Sequence[str], sensitivity: Array, sd: Array) -> None:
     if sensitivity.ndim != 3 or sensitivity.shape[::2] != (len(parameters), sd.size):
         raise TwinError(
-            f"limits: sensitivity has shape {sensitivity.shape}; allowed: "
+            f"cramer_rao: sensitivity has shape {sensitivity.shape}; allowed: "
             f"({len(parameters)} parameters, samples, {sd.size} channels)"
         )
     if (sd <= 0.0).any() or np.isinf(sd).any():
         raise TwinError(
-            f"limits: standard deviations of the noise are {sd.tolist()}; allowed: more than 0 "
+            f"cramer_rao: standard deviations of the noise are {sd.tolist()}; allowed: more than 0 "
             "(without noise there is no limit), or NaN for a channel that is not used"
         )

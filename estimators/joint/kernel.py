@@ -12,9 +12,9 @@ from numba import njit
 
 from estimators.ensemble.blocks import kalman_step
 from estimators.ensemble.rigid_body import project
-from estimators.joint.linearisation_error import doubt_linearity, wait_after_impact
-from estimators.joint.noise_inflation import forget_load, keep, load_changed, weigh
-from estimators.joint.parameter_tracking import follow, follow_speed
+from estimators.joint.linearisation_error import add_linearisation_error, wait_after_impact
+from estimators.joint.noise_inflation import forget_load, inflate_noise, keep, load_changed
+from estimators.joint.parameter_tracking import track_parameters, track_speed
 from estimators.joint.state import (
     ABSENT,
     BLOCKS,
@@ -39,78 +39,78 @@ from twin.kernel import is_sound, read_states, step
 
 
 @njit(cache=True, nogil=True)
-def update(cars, setup, memory, u, y):
+def update(cars, config, state, u, y):
     """One sample of inputs (nu,) and measurements (ny,)."""
     for i in range(cars.size):
-        step(cars[i], u, memory.out[i])
-    _delay(setup, memory)
+        step(cars[i], u, state.out[i])
+    _delay(config, state)
     for i in range(cars.size):
         for j in range(NY):
-            memory.total[i, j] += memory.late[i, j]
+            state.total[i, j] += state.late[i, j]
     for j in range(NY):
         if not np.isnan(y[j]):
-            memory.measured[j] += y[j]
-            memory.present[j] += 1.0
-    memory.clock[SAMPLES] += 1
-    if memory.clock[SAMPLES] < setup.block:
+            state.measured[j] += y[j]
+            state.present[j] += 1.0
+    state.clock[SAMPLES] += 1
+    if state.clock[SAMPLES] < config.block:
         return
-    memory.clock[SAMPLES] = 0
-    memory.clock[BLOCKS] += 1
-    _estimate(cars, setup, memory)
-    follow_speed(cars, setup, memory)
-    memory.total[:] = 0.0
-    memory.measured[:] = 0.0
-    memory.present[:] = 0.0
-    memory.edge[:] = memory.late[0]
+    state.clock[SAMPLES] = 0
+    state.clock[BLOCKS] += 1
+    _estimate(cars, config, state)
+    track_speed(cars, config, state)
+    state.total[:] = 0.0
+    state.measured[:] = 0.0
+    state.present[:] = 0.0
+    state.edge[:] = state.late[0]
 
 
 @njit(cache=True, nogil=True)
-def _delay(setup, memory):
-    """Fills memory.late with what the sensors should show now, given their estimated delay."""
-    k, late = memory.clock[TOTAL], 0.0
-    for i in range(setup.fault.size):
-        if setup.fault[i] == DELAY:
-            late = memory.z[setup.parameter.size + i] / setup.dt
-    memory.ring[k % RING] = memory.out
+def _delay(config, state):
+    """Fills state.late with what the sensors should show now, given their estimated delay."""
+    k, late = state.clock[TOTAL], 0.0
+    for i in range(config.sensor_error.size):
+        if config.sensor_error[i] == DELAY:
+            late = state.z[config.parameter.size + i] / config.dt
+    state.ring[k % RING] = state.out
     whole = min(max(int(np.floor(late)), 0), RING - 2)
     part = late - whole  # below zero it extrapolates
     newer, older = min(whole, k), min(whole + 1, k)
     newer, older = (k - newer) % RING, (k - older) % RING
-    for i in range(memory.late.shape[0]):
+    for i in range(state.late.shape[0]):
         for j in range(NY):
-            new, old = memory.ring[newer, i, j], memory.ring[older, i, j]
-            memory.late[i, j] = new + part * (old - new)
+            new, old = state.ring[newer, i, j], state.ring[older, i, j]
+            state.late[i, j] = new + part * (old - new)
     if k == 0:
-        memory.edge[:] = memory.late[0]
-    memory.clock[TOTAL] += 1
+        state.edge[:] = state.late[0]
+    state.clock[TOTAL] += 1
 
 
 @njit(cache=True, nogil=True)
-def _sensitivity(setup, memory):
+def _sensitivity(config, state):
     """(ny, q) of the block's mean outputs."""
-    p, q = setup.parameter.size, memory.z.size
+    p, q = config.parameter.size, state.z.size
     h = np.zeros((NY, q))
     for i in range(p):
         for j in range(NY):
-            difference = memory.total[i + 1, j] - memory.total[0, j]
-            h[j, i] = difference / (setup.block * setup.offset[i])
-    seconds = setup.block * setup.dt
-    change = (memory.late[0] - memory.edge) / seconds
-    rates = memory.total[0, 3:IMU] / setup.block
+            difference = state.total[i + 1, j] - state.total[0, j]
+            h[j, i] = difference / (config.block * config.step[i])
+    seconds = config.block * config.dt
+    change = (state.late[0] - state.edge) / seconds
+    rates = state.total[0, ROLL_RATE:IMU] / config.block
     for i in range(p, q):
-        fault = setup.fault[i - p]
-        if fault < IMU:
-            h[fault, i] = 1.0
-        elif fault == DELAY:
+        error = config.sensor_error[i - p]
+        if error < IMU:
+            h[error, i] = 1.0
+        elif error == DELAY:
             h[:, i] = -change
-        elif fault == SPEED:
+        elif error == SPEED:
             for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
-                h[j, i] = memory.total[0, j] / setup.block / max(memory.states[0, VX], 1.0)
+                h[j, i] = state.total[0, j] / config.block / max(state.states[0, VX], 1.0)
         else:
             arm = np.zeros(3)
-            arm[fault - POSITION] = 1.0
+            arm[error - POSITION] = 1.0
             turning = _cross(rates, _cross(rates, arm))
-            h[:3, i] = _cross(change[3:IMU], arm) + turning
+            h[:3, i] = _cross(change[ROLL_RATE:IMU], arm) + turning
     return h
 
 
@@ -123,20 +123,22 @@ def _cross(a, b):
 
 
 @njit(cache=True, nogil=True)
-def _innovation(setup, memory, h):
+def _innovation(config, state, h):
     """The block's mean innovation (ny,) and the variance of its noise (ny,)."""
     r, variance = np.zeros(NY), np.full(NY, ABSENT)
     for j in range(NY):
-        if memory.present[j] > 0.0 and not np.isnan(setup.noise[j]):
-            r[j] = memory.measured[j] / memory.present[j] - memory.total[0, j] / setup.block
-            variance[j] = setup.noise[j] / memory.present[j]
-    for i in range(setup.parameter.size, memory.z.size):
-        if setup.fault[i - setup.parameter.size] != DELAY:  # which is in the outputs already
+        if state.present[j] > 0.0 and not np.isnan(config.noise[j]):
+            r[j] = state.measured[j] / state.present[j] - state.total[0, j] / config.block
+            variance[j] = config.noise[j] / state.present[j]
+    for i in range(config.parameter.size, state.z.size):
+        if (
+            config.sensor_error[i - config.parameter.size] != DELAY
+        ):  # which is in the outputs already
             for j in range(NY):
                 if variance[j] < ABSENT:
-                    r[j] -= h[j, i] * memory.z[i]
-    for i in range(setup.parameter.size):
-        ahead = memory.z[i] - memory.theta[setup.parameter[i]]
+                    r[j] -= h[j, i] * state.z[i]
+    for i in range(config.parameter.size):
+        ahead = state.z[i] - state.theta[config.parameter[i]]
         for j in range(NY):
             if variance[j] < ABSENT:
                 r[j] -= h[j, i] * ahead
@@ -144,95 +146,95 @@ def _innovation(setup, memory, h):
 
 
 @njit(cache=True, nogil=True)
-def _is_excited(setup, memory):
-    """Whether the twin's own motion varies enough to tell anything."""
-    share = setup.block * setup.dt / setup.memory
-    mean, square = memory.excitation[0], memory.excitation[1]
+def _is_excited(config, state):
+    """Whether the twin's own motion varies enough to learn from it."""
+    share = config.block * config.dt / config.excitation_time
+    mean, square = state.excitation[0], state.excitation[1]
     total = 0.0
     for k in range(EXCITING.size):
-        value = memory.total[0, EXCITING[k]] / setup.block
-        if memory.clock[BLOCKS] == 1:
+        value = state.total[0, EXCITING[k]] / config.block
+        if state.clock[BLOCKS] == 1:
             mean[k], square[k] = value, value**2
         mean[k] += share * (value - mean[k])
         square[k] += share * (value**2 - square[k])
-        weight = 1.0 if EXCITING[k] < ROLL_RATE else setup.rate_weight
+        weight = 1.0 if EXCITING[k] < ROLL_RATE else config.rate_weight
         total += weight * (square[k] - mean[k] ** 2)
-    spin = min(memory.total[0, WHEEL_SPEED:].min() / setup.block, memory.late[:, -1].min())
-    return total >= setup.least_excitation and spin >= LEAST_SPIN
+    spin = min(state.total[0, WHEEL_SPEED:].min() / config.block, state.late[:, -1].min())
+    return total >= config.least_excitation and spin >= LEAST_SPIN
 
 
 @njit(cache=True, nogil=True)
-def _estimate(cars, setup, memory):
+def _estimate(cars, config, state):
     """A Kalman step on the parameters, and the twins after them."""
-    read_states(cars[0], memory.states[0])
-    h = _sensitivity(setup, memory)
-    r, variance = _innovation(setup, memory, h)
-    weigh(setup, memory, h, r, variance)
-    wait_after_impact(setup, memory, h, variance)
-    doubt_linearity(setup, memory, h, variance)
-    excited = _is_excited(setup, memory)
-    if memory.blocks[WAIT] > 0:
-        memory.blocks[WAIT] -= 1
+    read_states(cars[0], state.states[0])
+    h = _sensitivity(config, state)
+    r, variance = _innovation(config, state, h)
+    inflate_noise(config, state, h, r, variance)
+    wait_after_impact(config, state, h, variance)
+    add_linearisation_error(config, state, h, variance)
+    excited = _is_excited(config, state)
+    if state.blocks[WAIT] > 0:
+        state.blocks[WAIT] -= 1
         excited = False
-    if not excited or memory.clock[BLOCKS] <= setup.hold_off:
-        keep(setup, memory)
-    elif _changed(setup, memory, h, r):
-        forget_load(setup, memory)
-        for i in range(setup.parameter.size):
-            memory.estimate[setup.parameter[i]] = memory.z[i]
-        follow(cars, setup, memory)
+    if not excited or state.clock[BLOCKS] <= config.hold_off:
+        keep(config, state)
+    elif _changed(config, state, h, r):
+        forget_load(config, state)
+        for i in range(config.parameter.size):
+            state.estimate[config.parameter[i]] = state.z[i]
+        track_parameters(cars, config, state)
     else:
-        kalman_step(memory.z, memory.covariance, h, r, variance, setup.step_limit)
+        kalman_step(state.z, state.covariance, h, r, variance, config.step_limit)
         informed = np.empty_like(h)
         for j in range(NY):
             informed[j] = h[j] / variance[j]
-        memory.information[:] += h.T @ informed
-        for i in range(setup.parameter.size, memory.z.size):
-            if setup.fault[i - setup.parameter.size] == DELAY:
-                memory.z[i] = min(max(memory.z[i], -setup.dt), (RING - 2) * setup.dt)
-        project(memory.z, memory.covariance, setup.parameter, setup.nominal, memory.estimate)
-        follow(cars, setup, memory)
-    _drift(setup, memory)
+        state.information[:] += h.T @ informed
+        for i in range(config.parameter.size, state.z.size):
+            if config.sensor_error[i - config.parameter.size] == DELAY:
+                state.z[i] = min(max(state.z[i], -config.dt), (RING - 2) * config.dt)
+        project(state.z, state.covariance, config.parameter, config.nominal, state.estimate)
+        track_parameters(cars, config, state)
+    _drift(config, state)
 
 
 @njit(cache=True, nogil=True)
-def _changed(setup, memory, h, r):
+def _changed(config, state, h, r):
     """Whether the load is another since the last standstill; looked for a while after it."""
-    memory.blocks[DRIVEN] += 1
-    if memory.blocks[WATCH] == 0:
+    state.blocks[DRIVEN] += 1
+    if state.blocks[WATCH] == 0:
         return False
-    memory.blocks[WATCH] -= 1
-    return load_changed(setup, memory, h, r)
+    state.blocks[WATCH] -= 1
+    return load_changed(config, state, h, r)
 
 
 @njit(cache=True, nogil=True)
-def _drift(setup, memory):
+def _drift(config, state):
     """What a block's time adds to the variances; the twins' speeds are held, and forget."""
-    seconds, covariance = setup.block * setup.dt, memory.covariance
-    for i in range(memory.z.size):
-        fault = i - setup.parameter.size
-        if fault >= 0 and setup.fault[fault] == SPEED:
-            left = 1.0 - setup.speed_gain * seconds
-            memory.z[i] *= left
+    seconds, covariance = config.block * config.dt, state.covariance
+    for i in range(state.z.size):
+        error = i - config.parameter.size
+        if error >= 0 and config.sensor_error[error] == SPEED:
+            left = 1.0 - config.speed_gain * seconds
+            state.z[i] *= left
             covariance[i] *= left
             covariance[:, i] *= left
-        covariance[i, i] += setup.drift[i] * seconds
+        covariance[i, i] += config.drift[i] * seconds
 
 
 @njit(cache=True, nogil=True)
-def run(cars, setup, memory, inputs, measurements, log):
+def run(cars, config, state, inputs, measurements, log):
     """All samples of a drive; returns how many were sound."""
-    p = setup.parameter.size
+    p = config.parameter.size
     for k in range(inputs.shape[0]):
         read_states(cars[0], log.states[k])
-        update(cars, setup, memory, inputs[k], measurements[k])
-        log.parameters[k] = memory.estimate
-        log.outputs[k] = memory.out[0]
+        update(cars, config, state, inputs[k], measurements[k])
+        log.parameters[k] = state.estimate
+        log.outputs[k] = state.out[0]
         log.extended[k] = cars[0].tyre_output
-        for i in range(memory.z.size):
-            log.sd[k, i] = np.sqrt(memory.covariance[i, i])
-        log.faults[k] = memory.z[p:]
-        log.changes[k] = memory.changes[0]
+        for i in range(state.z.size):
+            log.sd[k, i] = np.sqrt(state.covariance[i, i])
+        log.sensor_errors[k] = state.z[p:]
+        log.changes[k] = state.changes[0]
         for i in range(cars.size):
             if not is_sound(cars[i]):
                 return k

@@ -1,4 +1,4 @@
-"""How far the joint observer trusts its sensitivities: they are differences, true only nearby.
+"""The linearisation error of the joint observer's sensitivities, which are finite differences.
 
 A sensitivity changes with the parameters by about its own size over a prior's standard deviation.
 As long as the estimates are uncertain, or far from the twins, that error is proportional to the
@@ -17,24 +17,24 @@ from estimators.joint.state import ABSENT, DRIVEN, LEAST_SPIN, NY, WAIT, WHEEL_S
 
 
 @njit(cache=True, nogil=True)
-def doubt_linearity(setup, memory, h, variance):
+def add_linearisation_error(config, state, h, variance):
     """Adds to the noise (ny,) the variance of what the sensitivities h (ny, q) leave out."""
-    p = setup.parameter.size
+    p = config.parameter.size
     uncertain, far = np.empty(p), 0.0
     for i in range(p):
-        ahead = memory.z[i] - memory.theta[setup.parameter[i]]
-        uncertain[i] = memory.covariance[i, i] + ahead**2
-        far += uncertain[i] / setup.prior[i] ** 2
-    share = setup.block * setup.dt / setup.memory
+        ahead = state.z[i] - state.theta[config.parameter[i]]
+        uncertain[i] = state.covariance[i, i] + ahead**2
+        far += uncertain[i] / config.prior[i] ** 2
+    share = config.block * config.dt / config.excitation_time
     for j in range(NY):
         second = 0.0
         for i in range(p):
-            memory.usual[j, i] += share * (h[j, i] ** 2 - memory.usual[j, i])
-            second += memory.usual[j, i] * uncertain[i]
+            state.usual[j, i] += share * (h[j, i] ** 2 - state.usual[j, i])
+            second += state.usual[j, i] * uncertain[i]
         if variance[j] < ABSENT:
-            variance[j] += setup.curvature * far * second
+            variance[j] += config.curvature * far * second
             if j >= WHEEL_SPEED:
-                variance[j] += _slip_doubt(setup, memory, h, j)
+                variance[j] += _slip_variance(config, state, h, j)
 
 
 @njit(cache=True, nogil=True)
@@ -47,7 +47,7 @@ def _own(h, j):
 
 
 @njit(cache=True, nogil=True)
-def _slip_doubt(setup, memory, h, j):
+def _slip_variance(config, state, h, j):
     """Variance of what a wheel's speed is beside its sensitivity: it may lock, or not.
 
     What the wheels have in common is the car's speed; the rest is slip. Near the peak of its tyre's
@@ -55,30 +55,30 @@ def _slip_doubt(setup, memory, h, j):
     """
     own = _own(h, j)
     ahead = 0.0
-    for i in range(setup.parameter.size):
-        ahead += own[i] * (memory.z[i] - memory.theta[setup.parameter[i]])
-    uncertain = own @ (memory.covariance @ own) + ahead**2
-    limit = setup.slip_range * max(memory.total[0, j] / setup.block, LEAST_SPIN)
+    for i in range(config.parameter.size):
+        ahead += own[i] * (state.z[i] - state.theta[config.parameter[i]])
+    uncertain = own @ (state.covariance @ own) + ahead**2
+    limit = config.slip_range * max(state.total[0, j] / config.block, LEAST_SPIN)
     return (uncertain / limit) ** 2
 
 
 @njit(cache=True, nogil=True)
-def _is_impact(setup, memory, h, variance):
+def _is_impact(config, state, h, variance):
     """Whether sensitivities jump from block to block: the twins meet a stop one by one."""
     for j in range(NY):
         jump, usual = 0.0, 0.0
-        for i in range(setup.parameter.size):
-            certainty = memory.covariance[i, i]
-            jump += (h[j, i] - memory.before[j, i]) ** 2 * certainty
-            usual += memory.usual[j, i] * certainty
-        if jump > max(usual, setup.impact * variance[j]):
+        for i in range(config.parameter.size):
+            certainty = state.covariance[i, i]
+            jump += (h[j, i] - state.before[j, i]) ** 2 * certainty
+            usual += state.usual[j, i] * certainty
+        if jump > max(usual, config.impact * variance[j]):
             return True
     return False
 
 
 @njit(cache=True, nogil=True)
-def wait_after_impact(setup, memory, h, variance):
+def wait_after_impact(config, state, h, variance):
     """Has the observer wait a little after an impact."""
-    if memory.blocks[DRIVEN] > 0 and _is_impact(setup, memory, h, variance):
-        memory.blocks[WAIT] = round(setup.impact_wait / (setup.block * setup.dt))
-    memory.before[:] = h
+    if state.blocks[DRIVEN] > 0 and _is_impact(config, state, h, variance):
+        state.blocks[WAIT] = round(config.impact_wait / (config.block * config.dt))
+    state.before[:] = h

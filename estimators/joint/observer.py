@@ -15,15 +15,17 @@ from estimators.black_box import settle
 from estimators.drive_channels import check_measurements, given_by
 from estimators.entry import Entry, Given
 from estimators.joint import kernel as joint_kernel
-from estimators.joint.state import RING, Log, Memory, Setup
-from estimators.priors import OFFSETS, PRIOR_SD, initial_deltas
+from estimators.joint.sensor_errors import SENSOR_ERROR, SENSOR_ERRORS
+from estimators.joint.state import RING, Configuration, Log, State
+from estimators.priors import initial_deltas
 from twin import (
     LOAD,
     OUTPUTS,
+    PARAMETER,
     PARAMETERS,
     SCALES,
     Drive,
-    Fleet,
+    Ensemble,
     Snapshot,
     TwinError,
     Vehicle,
@@ -32,14 +34,17 @@ from twin import (
 
 Array = NDArray[np.float64]
 
-# What is estimated of the sensors: biases of the IMU, the delay of all signals, the IMU's position
-# beside where the twin has it; and by how much the twins' speed is off. None of them needs a twin.
-FAULTS = (*(f"bias_{name}" for name in OUTPUTS[:6]), "delay", "imu_x", "imu_y", "imu_z", "speed")
-# A cheap IMU, mounted somewhere near, on a slow bus [m/s2, rad/s, s, m, m/s]
-FAULT_SD = dict(
-    zip(FAULTS, (0.1, 0.1, 0.1, 0.005, 0.005, 0.005, 0.01, 0.07, 0.07, 0.07, 0.1), strict=True)
+# Settings and what they may be: the least, and whether that itself is allowed
+_POSITIVE = (
+    *("tracking_time", "slip_range", "inflation_time", "change_time", "step_limit"),
+    *("valid_share", "impact"),
 )
-SPEED_DRIFT = 0.0003  # of the twins' speed, what no parameter explains [m/s per root of a second]
+_NOT_NEGATIVE = (
+    *("noise_inflation", "watch", "settle", "detection_threshold", "least_change", "drift"),
+    *("curvature", "speed_curvature", "impact_wait", "hold_off", "speed_gain", "least_excitation"),
+)
+RATE_WEIGHT = 900.0  # of the variance of a roll or pitch rate in the excitation [m2/s2]; chosen
+EXCITATION_TIME = 1.0  # over which the motion's variance is taken [s]; chosen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,49 +53,50 @@ class JointSettings:
 
     Attributes:
         parameters: of `twin.PARAMETERS`, one twin for each.
-        faults: of `FAULTS`, what is estimated of the sensors along.
-        prior_sd: by parameter, instead of `PRIOR_SD`.
-        doubt: by which the noise's variance is first taken larger, until innovations prove white.
-        doubt_memory: how fast that is seen [s].
+        sensor_errors: of `SENSOR_ERRORS`, nuisance parameters that are estimated along.
+        prior_sd: by parameter, instead of that of its record.
+        noise_inflation: factor of the noise's variance before innovations have proved white.
+        inflation_time: over which the innovations' whiteness is judged [s].
         watch: seconds of driving after a standstill in which a change of the load is looked for.
         settle: seconds of driving before the first standstill at which the load can change.
-        change_memory: how far back what contradicts the load is looked at [s].
-        surprise: least statistic of a change: chi-square, one degree of freedom for each parameter
-            of the load, as long as there is none and the model is right.
+        change_time: over which evidence of a change of the load is summed [s].
+        detection_threshold: least statistic of a change: chi-square, one degree of freedom for
+            each parameter of the load, if there is none and the model is right.
         least_change: of some parameter of the load, in its prior sd; less is no change of load.
-        valid_share: of its prior sd that an estimate's sd has to be below to count as valid.
-        drift: share of its prior sd that a parameter may wander over a second.
-        step: largest share of its prior sd by which an estimate moves in a block.
-        follow_time: by which the twins follow the estimates [s]: slower than the car's own modes.
-        curvature: variance of the error of a sensitivity over its square, once the parameters are
+        valid_share: of its prior sd; an estimate is valid while its sd is below.
+        drift: share of its prior sd by which a parameter may change [1 over the root of s].
+        step_limit: largest share of its prior sd by which an estimate moves in a block.
+        tracking_time: time constant of the twins' parameters behind the estimates [s]: longer than
+            the periods of the car's own modes.
+        curvature: variance of the error of a sensitivity over its square, if the parameters are
             uncertain by their prior sd in one of them. Above one, as it lasts for many blocks.
         speed_curvature: the same of the sensitivity of the speed to a move of the twins.
         slip_range: share of its speed that a wheel's slip may be uncertain by. Beyond, the noise
             of its speed grows with the square of that.
         impact: least jump of the sensitivities from block to block that counts as an impact, in
-            variances of the noise; what is usual of late is none.
-        impact_wait: seconds after one in which nothing is corrected.
+            variances of the noise, unless such jumps are usual.
+        impact_wait: seconds after an impact without corrections.
         hold_off: seconds before the first correction.
         block: samples per correction.
         speed_gain: draws each twin's speed to the measured wheel speeds [1/s].
-        least_excitation: variance over a second below which nothing is learnt [m2/s4]: that of
+        least_excitation: variance over a second below which nothing is corrected [m2/s4]: that of
             ax and ay, and 900 m2/s2 times that of roll and pitch rate.
     """
 
     parameters: tuple[str, ...] = (*LOAD, *SCALES)
-    faults: tuple[str, ...] = FAULTS
+    sensor_errors: tuple[str, ...] = SENSOR_ERRORS
     prior_sd: Mapping[str, float] = field(default_factory=dict)
-    doubt: float = 3.0
-    doubt_memory: float = 10.0
+    noise_inflation: float = 3.0
+    inflation_time: float = 10.0
     watch: float = 20.0
     settle: float = 5.0
-    change_memory: float = 2.0
-    surprise: float = 200.0
+    change_time: float = 2.0
+    detection_threshold: float = 200.0
     least_change: float = 0.15
     valid_share: float = 0.2
     drift: float = 0.0003
-    step: float = 0.1
-    follow_time: float = 0.4
+    step_limit: float = 0.1
+    tracking_time: float = 0.4
     curvature: float = 1.5
     speed_curvature: float = 0.03
     slip_range: float = 1.6e-4
@@ -100,6 +106,30 @@ class JointSettings:
     block: int = 10
     speed_gain: float = 0.5
     least_excitation: float = 0.02
+
+    def __post_init__(self) -> None:
+        """Checks names and numbers."""
+        estimated = [name for name in PARAMETERS if PARAMETER[name].prior_sd > 0.0]
+        for kind, names, allowed in (
+            ("parameters", self.parameters, estimated),
+            ("sensor_errors", self.sensor_errors, SENSOR_ERRORS),
+            ("prior_sd", tuple(self.prior_sd), estimated),
+        ):
+            if not set(names) <= set(allowed) or len(set(names)) < len(names):
+                raise TwinError(
+                    f"joint: {kind} are {', '.join(names)}; allowed: each at most once of "
+                    f"{', '.join(allowed)}"
+                )
+        for name, value in self.prior_sd.items():
+            if not 0.0 < value < np.inf:
+                raise TwinError(f"joint: prior_sd of {name} is {value}; allowed: above 0, finite")
+        for name in (*_POSITIVE, *_NOT_NEGATIVE):
+            value = getattr(self, name)
+            if not 0.0 <= value < np.inf or (value == 0.0 and name in _POSITIVE):
+                least = "above 0" if name in _POSITIVE else "0 or more"
+                raise TwinError(f"joint: {name} is {value}; allowed: {least}, finite")
+        if not isinstance(self.block, int) or self.block < 1:
+            raise TwinError(f"joint: block is {self.block}; allowed: a whole number, 1 or more")
 
 
 def _none() -> Any:
@@ -131,7 +161,7 @@ class JointSnapshot(NamedTuple):
     """Everything that decides a joint observer's future."""
 
     twins: tuple[Snapshot, ...]
-    memory: Memory
+    state: State
 
 
 class JointObserver:
@@ -154,29 +184,33 @@ class JointObserver:
     ) -> None:
         self.settings = settings
         names = settings.parameters
-        _check(settings, np.asarray(noise_sd, dtype=np.float64))
-        self.fleet = Fleet(vehicle, len(names) + 1)
-        self.estimated = (*names, *settings.faults)
-        prior = PRIOR_SD | dict(settings.prior_sd)
+        _check_noise(np.asarray(noise_sd, dtype=np.float64))
+        self.ensemble = Ensemble(vehicle, len(names) + 1)
+        self.estimated = (*names, *settings.sensor_errors)
+        prior = {name: PARAMETER[name].prior_sd for name in names} | dict(settings.prior_sd)
+        errors = [SENSOR_ERROR[name] for name in settings.sensor_errors]
         self._prior = np.array(
-            [prior[name] for name in names] + [FAULT_SD[name] for name in settings.faults]
+            [*(prior[name] for name in names), *(error.prior_sd for error in errors)]
         )
         drift = settings.drift * self._prior
-        if "speed" in settings.faults:
-            drift[self.estimated.index("speed")] = SPEED_DRIFT
-        first = self.fleet.twins[0]
+        for i, error in enumerate(errors, len(names)):
+            if error.drift is not None:
+                drift[i] = error.drift
+        first = self.ensemble.twins[0]
         self.dt = first.dt
-        self._setup = Setup(
+        self._config = Configuration(
             parameter=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
-            offset=np.array([OFFSETS[name] for name in names]),
-            fault=np.array([FAULTS.index(name) for name in settings.faults], dtype=np.int64),
-            follow_time=settings.follow_time,
+            step=np.array([PARAMETER[name].step for name in names]),
+            sensor_error=np.array(
+                [SENSOR_ERRORS.index(name) for name in settings.sensor_errors], dtype=np.int64
+            ),
+            tracking_time=settings.tracking_time,
             curvature=settings.curvature,
             speed_curvature=settings.speed_curvature,
             slip_range=settings.slip_range,
             impact=settings.impact,
             impact_wait=settings.impact_wait,
-            step_limit=settings.step * self._prior,
+            step_limit=settings.step_limit * self._prior,
             drift=drift**2,
             noise=np.asarray(noise_sd, dtype=np.float64) ** 2,
             nominal=first.car.nominal.copy(),
@@ -184,22 +218,21 @@ class JointObserver:
             hold_off=round(settings.hold_off / (settings.block * self.dt)),
             speed_gain=settings.speed_gain,
             least_excitation=settings.least_excitation,
-            rate_weight=900.0,
-            memory=1.0,
-            doubt=settings.doubt,
-            doubt_memory=settings.doubt_memory,
+            rate_weight=RATE_WEIGHT,
+            excitation_time=EXCITATION_TIME,
+            inflation_time=settings.inflation_time,
             prior=self._prior.copy(),
             load=np.array([i for i, n in enumerate(names) if n in LOAD], dtype=np.int64),
             watch=round(settings.watch / (settings.block * self.dt)),
             settle=round(settings.settle / (settings.block * self.dt)),
-            change_memory=settings.change_memory,
-            surprise=settings.surprise,
+            change_time=settings.change_time,
+            detection_threshold=settings.detection_threshold,
             least_change=settings.least_change,
             dt=self.dt,
         )
-        n, p, q = len(self.fleet), len(PARAMETERS), self._prior.size
+        n, p, q = len(self.ensemble), len(PARAMETERS), self._prior.size
         ny, nx = len(OUTPUTS), len(first.states)
-        self._memory = Memory(
+        self._state = State(
             theta=np.zeros(p), estimate=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
             present=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
@@ -208,9 +241,9 @@ class JointObserver:
             excitation=np.zeros((2, 4)),
             information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
             ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
-            doubt=np.zeros(ny), window=np.zeros((3, ny)), window_h=np.zeros((ny, q)),
+            inflation=np.zeros(ny), window=np.zeros((3, ny)), window_h=np.zeros((ny, q)),
             recent=np.zeros((q, q)), score=np.zeros(q), kept=np.zeros(q),
-            kept_covariance=np.zeros((q, q)), kept_doubt=np.zeros(ny),
+            kept_covariance=np.zeros((q, q)), kept_inflation=np.zeros(ny),
             blocks=np.zeros(3, dtype=np.int64), changes=np.zeros(1, dtype=np.int64),
         )  # fmt: skip
         self.reset(0.0)
@@ -228,25 +261,25 @@ class JointObserver:
             parameters: initial deltas from the nominal values by name; zero where not given.
             road: (4,) height under each wheel [m]; zero if not given.
         """
-        memory = self._memory
-        for array in memory:
+        state = self._state
+        for array in state:
             array[:] = 0
-        memory.theta[:] = initial_deltas(parameters)
-        memory.estimate[:] = memory.theta
-        memory.z[: self._setup.parameter.size] = memory.theta[self._setup.parameter]
-        memory.covariance[:] = np.diag(self._prior**2)
-        memory.doubt[:] = self.settings.doubt
-        for i, twin in enumerate(self.fleet.twins):
-            p = memory.theta.copy()
+        state.theta[:] = initial_deltas(parameters)
+        state.estimate[:] = state.theta
+        state.z[: self._config.parameter.size] = state.theta[self._config.parameter]
+        state.covariance[:] = np.diag(self._prior**2)
+        state.inflation[:] = self.settings.noise_inflation
+        for i, twin in enumerate(self.ensemble.twins):
+            p = state.theta.copy()
             if i > 0:
-                p[self._setup.parameter[i - 1]] += self._setup.offset[i - 1]
+                p[self._config.parameter[i - 1]] += self._config.step[i - 1]
             twin.set_parameters(p)
             settle(twin, speed, road)
 
     @property
     def covariance(self) -> Array:
         """(p + b, p + b) of `estimated`, now."""
-        return self._memory.covariance.copy()
+        return self._state.covariance.copy()
 
     def update(self, u: ArrayLike, y: ArrayLike) -> Array:
         """Takes one sample of inputs (13,) and measurements (10,); returns the parameters (15,).
@@ -258,17 +291,17 @@ class JointObserver:
         y = np.ascontiguousarray(y, dtype=np.float64)
         check_inputs(u[None], "update")
         check_measurements(y[None], OUTPUTS, "update", infinite=False)
-        joint_kernel.update(self.fleet.cars, self._setup, self._memory, u, y)
-        for twin in self.fleet.twins:
+        joint_kernel.update(self.ensemble.cars, self._config, self._state, u, y)
+        for twin in self.ensemble.twins:
             twin.check()
-        return self._memory.estimate.copy()
+        return self._state.estimate.copy()
 
     def snapshot(self) -> JointSnapshot:
         """Everything that decides the future; a run from it is bit-exact."""
         return JointSnapshot(
-            tuple(twin.snapshot() for twin in self.fleet.twins),
-            self._memory._replace(
-                **{name: array.copy() for name, array in self._memory._asdict().items()}
+            tuple(twin.snapshot() for twin in self.ensemble.twins),
+            self._state._replace(
+                **{name: array.copy() for name, array in self._state._asdict().items()}
             ),
         )
 
@@ -278,16 +311,17 @@ class JointObserver:
         Raises:
             TwinError: it estimates something else.
         """
-        if snapshot.memory.out.shape != self._memory.out.shape or (
-            snapshot.memory.z.shape != self._memory.z.shape
+        if snapshot.state.out.shape != self._state.out.shape or (
+            snapshot.state.z.shape != self._state.z.shape
         ):
             raise TwinError(
-                f"joint: the snapshot has {snapshot.memory.z.size} estimates of "
-                f"{len(snapshot.twins)} twins; allowed: {self._memory.z.size} of {len(self.fleet)}"
+                f"joint: the snapshot has {snapshot.state.z.size} estimates of "
+                f"{len(snapshot.twins)} twins; allowed: {self._state.z.size} of "
+                f"{len(self.ensemble)}"
             )
-        for twin, kept in zip(self.fleet.twins, snapshot.twins, strict=True):
+        for twin, kept in zip(self.ensemble.twins, snapshot.twins, strict=True):
             twin.restore(kept)
-        for array, kept in zip(self._memory, snapshot.memory, strict=True):
+        for array, kept in zip(self._state, snapshot.state, strict=True):
             array[:] = kept
 
     def run(self, drive: Drive) -> JointEstimate:
@@ -296,7 +330,7 @@ class JointObserver:
         Raises:
             TwinError: the drive does not fit the twins, or a twin has blown up.
         """
-        twin = self.fleet.twins[0]
+        twin = self.ensemble.twins[0]
         given = given_by(drive, twin, None)
         check_measurements(given.measurements, OUTPUTS, "drive", infinite=False)
         check_inputs(given.inputs, "drive")
@@ -307,11 +341,11 @@ class JointObserver:
             outputs=np.empty((n, len(OUTPUTS))),
             extended=np.empty((n, *twin.car.tyre_output.shape)),
             sd=np.empty((n, q)),
-            faults=np.empty((n, q - self._setup.parameter.size)),
+            sensor_errors=np.empty((n, q - self._config.parameter.size)),
             changes=np.empty(n, dtype=np.int64),
         )
         done = joint_kernel.run(
-            self.fleet.cars, self._setup, self._memory, given.inputs, given.measurements, log
+            self.ensemble.cars, self._config, self._state, given.inputs, given.measurements, log
         )
         if done < n:
             raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
@@ -321,34 +355,20 @@ class JointObserver:
             parameters=log.parameters,
             outputs=log.outputs,
             extended=log.extended.reshape(n, -1),
-            nominal=self._setup.nominal.copy(),
+            nominal=self._config.nominal.copy(),
             estimated=self.estimated,
-            sensor_error_names=self.settings.faults,
+            sensor_error_names=self.settings.sensor_errors,
             prior=self._prior.copy(),
             sd=log.sd,
             valid=log.sd < self.settings.valid_share * self._prior,
             changes=log.changes,
-            sensor_errors=log.faults,
-            covariance=self._memory.covariance.copy(),
-            information=self._memory.information.copy(),
+            sensor_errors=log.sensor_errors,
+            covariance=self._state.covariance.copy(),
+            information=self._state.information.copy(),
         )
 
 
-def _check(settings: JointSettings, noise_sd: Array) -> None:
-    for name in ("follow_time", "slip_range", "doubt_memory", "change_memory"):
-        if not 0.0 < (value := getattr(settings, name)) < np.inf:
-            raise TwinError(f"joint: {name} is {value}; allowed: a finite number above zero")
-    unknown = [name for name in settings.parameters if name not in PRIOR_SD]
-    if unknown or len(set(settings.parameters)) < len(settings.parameters):
-        raise TwinError(
-            f"joint: parameters are {', '.join(settings.parameters)}; allowed: each at most once "
-            f"of {', '.join(PRIOR_SD)}"
-        )
-    if not set(settings.faults) <= set(FAULTS) or len(set(settings.faults)) < len(settings.faults):
-        raise TwinError(
-            f"joint: faults are {', '.join(settings.faults)}; allowed: each at most once of "
-            f"{', '.join(FAULTS)}"
-        )
+def _check_noise(noise_sd: Array) -> None:
     if noise_sd.shape != (len(OUTPUTS),) or not (np.isnan(noise_sd) | (noise_sd > 0.0)).all():
         raise TwinError(
             f"joint: noise_sd is {noise_sd.tolist()}; allowed: {len(OUTPUTS)} numbers above zero, "
@@ -371,7 +391,7 @@ ENTRY = Entry(
     make=_make,
     needs=frozenset(("twin", "noise_sd")),
     channels=OUTPUTS,
-    gives=(*LOAD, *SCALES, *FAULTS, "sideslip"),
+    gives=(*LOAD, *SCALES, *SENSOR_ERRORS, "sideslip"),
     sd=True,
     online=True,
 )

@@ -17,72 +17,72 @@ from twin.kernel import correct, read_states, set_parameters
 
 
 @njit(cache=True, nogil=True)
-def follow(cars, setup, memory):
+def track_parameters(cars, config, state):
     """Moves the twins' parameters towards the estimates and every twin's states by S d."""
-    n, p = cars.size, setup.parameter.size
-    seconds = setup.block * setup.dt
-    share = seconds / setup.follow_time
+    n, p = cars.size, config.parameter.size
+    seconds = config.block * config.dt
+    share = seconds / config.tracking_time
     d = np.empty(p)
     for i in range(p):
-        ahead = memory.z[i] - memory.theta[setup.parameter[i]]
-        memory.rate[i] += share * (ahead - 2.0 * memory.rate[i])
-        d[i] = share * memory.rate[i]
-        memory.went[i] += d[i] - setup.speed_gain * seconds * memory.went[i]
-    states, dx, theta = memory.states, memory.dx, memory.theta
+        ahead = state.z[i] - state.theta[config.parameter[i]]
+        state.rate[i] += share * (ahead - 2.0 * state.rate[i])
+        d[i] = share * state.rate[i]
+        state.went[i] += d[i] - config.speed_gain * seconds * state.went[i]
+    states, dx, theta = state.states, state.dx, state.theta
     for i in range(n):
         read_states(cars[i], states[i])
-    _doubt_speed(setup, memory)
+    _bound_speed_certainty(config, state)
     dx[:] = 0.0
     for i in range(p):
         for k in range(NX):
-            dx[k] += (states[i + 1, k] - states[0, k]) * d[i] / setup.offset[i]
+            dx[k] += (states[i + 1, k] - states[0, k]) * d[i] / config.step[i]
     for i in range(p):
-        theta[setup.parameter[i]] += d[i]
+        theta[config.parameter[i]] += d[i]
     for i in range(n):
         move_states(cars[i], dx.copy(), states[0, ROLL])
-        memory.p[:] = theta
+        state.p[:] = theta
         if i > 0:
-            memory.p[setup.parameter[i - 1]] += setup.offset[i - 1]
-        set_parameters(cars[i], memory.p)
+            state.p[config.parameter[i - 1]] += config.step[i - 1]
+        set_parameters(cars[i], state.p)
 
 
 @njit(cache=True, nogil=True)
-def _doubt_speed(setup, memory):
+def _bound_speed_certainty(config, state):
     """Lets the common error of the twins' speeds be no smaller than what following leaves.
 
     Speed is the state that forgets last: with 1 / speed_gain. What the parameters went in that
     time, S of the speed had not followed.
     """
     moved, uncertain = 0.0, 0.0
-    for i in range(setup.parameter.size):
-        slope = (memory.states[i + 1, VX] - memory.states[0, VX]) / setup.offset[i]
-        moved += (memory.went[i] / setup.prior[i]) ** 2
-        uncertain += slope**2 * (memory.covariance[i, i] + memory.went[i] ** 2)
-    for i in range(setup.parameter.size, memory.z.size):
-        if setup.fault[i - setup.parameter.size] == SPEED:
-            least = setup.speed_curvature * moved * uncertain
-            memory.covariance[i, i] = max(memory.covariance[i, i], least)
+    for i in range(config.parameter.size):
+        slope = (state.states[i + 1, VX] - state.states[0, VX]) / config.step[i]
+        moved += (state.went[i] / config.prior[i]) ** 2
+        uncertain += slope**2 * (state.covariance[i, i] + state.went[i] ** 2)
+    for i in range(config.parameter.size, state.z.size):
+        if config.sensor_error[i - config.parameter.size] == SPEED:
+            least = config.speed_curvature * moved * uncertain
+            state.covariance[i, i] = max(state.covariance[i, i], least)
 
 
 @njit(cache=True, nogil=True)
-def follow_speed(cars, setup, memory):
+def track_speed(cars, config, state):
     """Draws each twin's speed weakly to its own innovation of the wheel speeds."""
-    share = setup.speed_gain * setup.block * setup.dt
+    share = config.speed_gain * config.block * config.dt
     if share == 0.0:
         return
     for i in range(cars.size):
         late, spin, n = 0.0, 0.0, 0
         for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
-            if memory.present[j] > 0.0:
-                mean = memory.total[i, j] / setup.block
-                late += memory.measured[j] / memory.present[j] - mean
+            if state.present[j] > 0.0:
+                mean = state.total[i, j] / config.block
+                late += state.measured[j] / state.present[j] - mean
                 spin += mean
                 n += 1
         if n == 0 or spin < n * LEAST_SPIN:
             continue
-        read_states(cars[i], memory.states[i])
-        memory.dx[:] = 0.0
-        memory.dx[VX] = share * late / spin * memory.states[i, VX]
+        read_states(cars[i], state.states[i])
+        state.dx[:] = 0.0
+        state.dx[VX] = share * late / spin * state.states[i, VX]
         for k in range(SPIN, SPIN + 4):
-            memory.dx[k] = share * late / spin * memory.states[i, k]
-        correct(cars[i], memory.dx)
+            state.dx[k] = share * late / spin * state.states[i, k]
+        correct(cars[i], state.dx)

@@ -5,38 +5,38 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from twin import OUTPUTS, STATES
+from estimators.joint.sensor_errors import E
+from twin import IMU as IMU_OUTPUTS
+from twin import OUTPUTS, SPINS, STATES, WHEEL_SPEEDS, X, Y
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-IMU, NY, NX = 6, len(OUTPUTS), len(STATES)
-WHEEL_SPEED = OUTPUTS.index("wheel_speed_fl")
-ROLL, VX, SPIN = (STATES.index(n) for n in ("roll", "vx", "wheel_speed_fl"))
-AX, AY, ROLL_RATE, PITCH_RATE = (OUTPUTS.index(n) for n in ("ax", "ay", "roll_rate", "pitch_rate"))
-EXCITING = np.array([AX, AY, ROLL_RATE, PITCH_RATE])
+NY, NX = len(OUTPUTS), len(STATES)
+IMU, WHEEL_SPEED = IMU_OUTPUTS.stop, WHEEL_SPEEDS.start
+ROLL, VX, SPIN = X.roll, X.vx, SPINS.start
+ROLL_RATE = Y.roll_rate
+EXCITING = np.array([Y.ax, Y.ay, Y.roll_rate, Y.pitch_rate])
 ABSENT = 1e12  # variance of a channel that has no measurement
-# Wheels slower than this [rad/s], 1 m/s, tell nothing: the instant of a stop is a jump
+# Slower wheels than this [rad/s], 1 m/s, are not used: the instant of a stop is a jump
 LEAST_SPIN = 3.0
-STANDING = 0.5  # and slower than this the car stands; chosen
+STANDING = 0.5  # and slower than this the car stands [rad/s]; chosen
 # Blocks: left to look for a change of the load; of exciting driving so far; left to wait
 WATCH, DRIVEN, WAIT = 0, 1, 2
 SAMPLES, BLOCKS, TOTAL = 0, 1, 2  # what the clock counts: of the block, blocks, of all
-# What is estimated of the sensors besides parameters: biases, delay, the place of the IMU; and of
-# the twins by how much their common speed is off
-DELAY, POSITION, SPEED = IMU, IMU + 1, IMU + 4
+DELAY, POSITION, SPEED = E.delay, E.imu_x, E.speed
 RING = 64  # samples: the longest delay
-LARGEST_DOUBT = 1e3  # of one window
+LARGEST_INFLATION = 1e3  # of one window
 WINDOW = 16  # blocks over which innovations are summed to see whether they are white
 
 
-class Setup(NamedTuple):
-    """What does not change: p parameters, q estimates (parameters, then faults of sensors)."""
+class Configuration(NamedTuple):
+    """What does not change: p parameters, q estimates (parameters, then sensor errors)."""
 
     parameter: Indices  # (p,) of each among the twin's
-    offset: Array  # (p,) of its twin
-    fault: Indices  # (q - p,) of the sensors: channel of a bias, DELAY, POSITION + axis
-    follow_time: float  # of the twins behind the estimates [s]
+    step: Array  # (p,) by which its twin is off
+    sensor_error: Indices  # (q - p,) of `SENSOR_ERRORS`: channel of a bias, DELAY, ...
+    tracking_time: float  # of the twins behind the estimates [s]
     curvature: float  # of the sensitivities, per prior variance
     speed_curvature: float  # the same of the speed's
     slip_range: float  # share of a wheel's speed
@@ -51,22 +51,20 @@ class Setup(NamedTuple):
     speed_gain: float  # of the twins' speeds [1/s]
     least_excitation: float  # [m2/s4]
     rate_weight: float  # of a roll or pitch rate in it [m2/s2]
-    memory: float  # of excitation [s]
-    doubt: float  # first factor of the noise's variance, before innovations prove it white
-    doubt_memory: float  # [s]
+    excitation_time: float  # over which the motion's variance is taken [s]
+    inflation_time: float  # over which the innovations' whiteness is judged [s]
     prior: Array  # (q,) standard deviations
     load: Indices  # (l,) estimates that a change of the load changes
     watch: int  # blocks of driving after a standstill in which such a change is looked for
     settle: int  # blocks of driving before the first
-    change_memory: float  # of what contradicts [s]
-    surprise: (
-        float  # least statistic of a change, chi-square of l degrees of freedom if there is none
-    )
+    change_time: float  # over which what contradicts is summed [s]
+    # least statistic of a change: chi-square of l degrees of freedom if there is none
+    detection_threshold: float
     least_change: float  # and least change of any of them, of its prior sd
     dt: float  # of a sample [s]
 
 
-class Memory(NamedTuple):
+class State(NamedTuple):
     """What the observer keeps from sample to sample, beside its twins."""
 
     theta: Array  # (np,) parameters of twin 0
@@ -80,8 +78,8 @@ class Memory(NamedTuple):
     states: Array  # (n, nx)
     dx: Array  # (nx,)
     p: Array  # (np,) what is set
-    rate: Array  # (p,) at which the twins follow, times the time in which they do
-    went: Array  # (p,) what they moved lately
+    rate: Array  # (p,) at which the twins move, times the tracking time
+    went: Array  # (p,) what they moved recently
     usual: Array  # (ny, p) mean squares of the sensitivities
     before: Array  # (ny, q) sensitivities of the block before
     excitation: Array  # (2, 4) means and squares of what excites
@@ -89,14 +87,14 @@ class Memory(NamedTuple):
     ring: Array  # (RING, n, ny) the twins' last outputs
     late: Array  # (n, ny) the twins' outputs of the delay ago
     edge: Array  # (ny,) of twin 0 at the end of the block before
-    doubt: Array  # (ny,) factor of each channel's variance that its innovations show
+    inflation: Array  # (ny,) factor of each channel's variance that its innovations show
     window: Array  # (3, ny) sums of innovations, of their variance; number of blocks
     window_h: Array  # (ny, q) sums of sensitivities
     recent: Array  # (q, q) information of the last seconds
     score: Array  # (q,) and what it says of the parameters' error
     kept: Array  # (q,) estimates at the last standstill
     kept_covariance: Array  # (q, q)
-    kept_doubt: Array  # (ny,)
+    kept_inflation: Array  # (ny,)
     blocks: Indices  # (3,)
     changes: Indices  # (1,) of the load, so far
     clock: Indices  # (3,)
@@ -110,5 +108,5 @@ class Log(NamedTuple):
     outputs: Array  # (N, ny)
     extended: Array  # (N, 4, 9)
     sd: Array  # (N, q)
-    faults: Array  # (N, q - p)
+    sensor_errors: Array  # (N, q - p)
     changes: Indices  # (N,)

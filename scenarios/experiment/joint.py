@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.identifiability.cramer_rao import limits
+from estimators.identifiability.cramer_rao import cramer_rao
 from estimators.identifiability.report import report
-from estimators.joint.observer import FAULTS, JointEstimate, JointObserver, JointSettings
+from estimators.joint.observer import JointEstimate, JointObserver, JointSettings
+from estimators.joint.sensor_errors import SENSOR_ERRORS
 from estimators.score import settling_time
 from scenarios.cli.catalogue import Scenario, Settings
 from scenarios.driving import joint_drives
@@ -109,10 +110,10 @@ def truth(drive: Drive) -> Array:
 
 
 def faults(sensors: Sensors) -> dict[str, float]:
-    """What the observer should find of the sensors, by name of `FAULTS`."""
+    """What the observer should find of the sensors, by name of `SENSOR_ERRORS`."""
     biases = (*sensors.acceleration_bias, *sensors.rate_bias)
     found = (*biases, sensors.delay, *sensors.position, 0.0)
-    return dict(zip(FAULTS, found, strict=True))
+    return dict(zip(SENSOR_ERRORS, found, strict=True))
 
 
 def observe(
@@ -172,7 +173,7 @@ def bound(drive: str, snr: float, duration: float | None) -> Array:
     ]
     means = np.array([c.reshape(-1, BLOCK, len(OUTPUTS)).mean(axis=1) for c in columns])
     sd = noise_sd(clean.measurements, snr) / np.sqrt(BLOCK)
-    return limits(NAMES, means, sd).joint
+    return cramer_rao(NAMES, means, sd).joint
 
 
 def units() -> Array:

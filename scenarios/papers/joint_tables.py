@@ -69,7 +69,9 @@ def score(run: Run) -> list[tuple[float, float]]:
     sd = [drive.settings["noise_sd"][name] for name in OUTPUTS]
     known = {name: variation()[name] for name in run.case.known}
     names = tuple(name for name in LOAD if name not in known)
-    observer = JointObserver(Vehicle.load(TWIN), sd, JointSettings(parameters=names, faults=()))
+    observer = JointObserver(
+        Vehicle.load(TWIN), sd, JointSettings(parameters=names, sensor_errors=())
+    )
     observer.reset(float(clean.truth["vx"][0]), known, road=drive.inputs[0, 9:13])
     estimate = observer.run(drive)
     return [

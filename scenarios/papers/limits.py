@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.identifiability.cramer_rao import Limits, limits, sensitivities
+from estimators.identifiability.cramer_rao import CramerRaoBound, cramer_rao, sensitivities
 from estimators.til.law import ParameterLaw
 from scenarios.cli.catalogue import Scenario, Settings
 from scenarios.experiment.progress import progress
@@ -53,12 +53,12 @@ def run(name: str, scenario: Scenario, settings: Settings) -> tuple[Result, str]
         ]
     )
     together = {
-        case: limits(tuple(UNITS), sensitivity, using(sd, channels))
+        case: cramer_rao(tuple(UNITS), sensitivity, using(sd, channels))
         for case, channels in TOGETHER.items()
     }
     moving = sensitivity[:, is_moving(drive, MOVING)]
     alone = {
-        channel: limits(tuple(UNITS), moving, using(sd, channels))
+        channel: cramer_rao(tuple(UNITS), moving, using(sd, channels))
         for channel, channels in ALONE.items()
     }
     rows = [
@@ -114,7 +114,7 @@ def law_limit(law: ParameterLaw, sensitivity: Array, drive: Drive, sd: Array) ->
         drive: without noise.
         sd: (10,) of the noise.
     """
-    bound = limits(
+    bound = cramer_rao(
         [law.parameter],
         sensitivity[:, is_moving(drive, law.least_wheel_speed)],
         using(sd, [law.output]),
@@ -129,7 +129,7 @@ def percent(sd: float, variation: float) -> float:
 
 
 def _rows(
-    case: str, metric: str, bound: Limits, sds: Array, variation: Mapping[str, float]
+    case: str, metric: str, bound: CramerRaoBound, sds: Array, variation: Mapping[str, float]
 ) -> list[Row]:
     return [
         _row(case, name, metric, percent(sd, variation[name]), "%")
@@ -137,7 +137,7 @@ def _rows(
     ]
 
 
-def _rows_together(case: str, bound: Limits, variation: Mapping[str, float]) -> list[Row]:
+def _rows_together(case: str, bound: CramerRaoBound, variation: Mapping[str, float]) -> list[Row]:
     names = bound.parameters
     return [
         *_rows(case, "limit_single", bound, bound.single, variation),
@@ -156,7 +156,7 @@ def _row(case: str, quantity: str, metric: str, value: float, unit: str) -> Row:
     )
 
 
-def _text(case: str, bound: Limits, variation: Mapping[str, float]) -> str:
+def _text(case: str, bound: CramerRaoBound, variation: Mapping[str, float]) -> str:
     parts = [
         f"{case}: standard deviations\n{_deviations(bound, variation)}",
         f"{case}: correlation of the joint errors\n{_correlation(bound)}",
@@ -166,7 +166,7 @@ def _text(case: str, bound: Limits, variation: Mapping[str, float]) -> str:
     return "\n\n".join(parts)
 
 
-def _deviations(bound: Limits, variation: Mapping[str, float]) -> str:
+def _deviations(bound: CramerRaoBound, variation: Mapping[str, float]) -> str:
     heading = ["", "unit", "variation", "single", "joint", "single [%]", "joint [%]"]
     lines = [
         [
@@ -180,7 +180,7 @@ def _deviations(bound: Limits, variation: Mapping[str, float]) -> str:
     return _aligned([heading, *lines])
 
 
-def _correlation(bound: Limits) -> str:
+def _correlation(bound: CramerRaoBound) -> str:
     lines = [
         [name, *(f"{value:.2f}" for value in row)]
         for name, row in zip(bound.parameters, bound.correlation, strict=True)
@@ -188,7 +188,7 @@ def _correlation(bound: Limits) -> str:
     return _aligned([["", *bound.parameters], *lines])
 
 
-def _by_channel(bounds: Mapping[str, Limits], variation: Mapping[str, float]) -> str:
+def _by_channel(bounds: Mapping[str, CramerRaoBound], variation: Mapping[str, float]) -> str:
     lines = [
         [name, *(_number(percent(bound.single[i], variation[name])) for bound in bounds.values())]
         for i, name in enumerate(UNITS)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import twin
 from estimators.joint.observer import JointEstimate
+from estimators.joint.sensor_errors import SENSOR_ERROR
 from scenarios.timeline import scene as timeline_3d
 from scenarios.timeline import timeline as tl
 from scenarios.timeline.inertia import log_inertia
@@ -27,7 +28,6 @@ MARGIN = 0.4  # of the prior's sd, shown beyond truth and estimate: chosen
 _BAND: Colour = (70, 120, 160)
 _CHANGE: Colour = (235, 90, 160)
 _UNKNOWN, _KNOWN = (75, 80, 90), (60, 140, 100)
-_FAULT_UNITS = {"a": "m/s²", "r": "rad/s", "p": "rad/s", "y": "rad/s"}  # of what is biased
 CHANGES = "changes of the load"
 SUBJECT = "inertia as a uniform ellipsoid, estimate orange, truth green"
 _TABS = {"load": "load", "model": "tyres and springs", "sensors": "sensors"}
@@ -49,7 +49,7 @@ def write_joint_timeline(
         vehicle: what is drawn.
         drive: of N samples; what its truth lacks is shown without it.
         estimate: over that drive.
-        faults: of the real sensors, by name of `FAULTS`; others are not known.
+        faults: of the real sensors, by name of `SENSOR_ERRORS`; others are not known.
         title: what the viewer calls the recording.
 
     Raises:
@@ -152,8 +152,7 @@ def _group(name: str) -> str:
 def _unit(name: str) -> str:
     if name in twin.PARAMETERS:
         return tl.unit_of(name)
-    kind, _, biased = name.partition("_")
-    return {"delay": "s", "imu": "m", "speed": "m/s"}.get(kind) or _FAULT_UNITS[biased[0]]
+    return SENSOR_ERROR[name].unit.replace("2", "²")
 
 
 def _lanes(estimate: JointEstimate) -> dict[str, Lane]:
