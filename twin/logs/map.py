@@ -9,6 +9,9 @@
     name = "t"              # by default the column that is called time, or declared to be it
     unit = "s"              # by default the one that the log gives; none for timestamps
 
+    [can]                   # raw CAN logs (BLF, ASC, candump, TRC, CSV, MF4)
+    database = "car.dbc"    # DBC, ARXML, KCD or SYM, beside the map; channels are "Message.signal"
+
     [channels.ax]           # an input or measurement of ours
     name = "LongAcc"        # the log's channel
     unit = "g"              # by default the one that the log gives
@@ -45,7 +48,17 @@ MEASURABLE = (*OUTPUTS, *FURTHER_OUTPUTS)
 # What turns its sign between ISO 8855 and SAE J670
 TURNED = ("steering_wheel_angle", "ay", "az", "pitch_rate", "yaw_rate", "vy", "sideslip", "pitch")
 
-_KEYS = ("axes", "rate", "longest_gap", "follow_speed", "time", "channels", "truth", "constants")
+_KEYS = (
+    "axes",
+    "rate",
+    "longest_gap",
+    "follow_speed",
+    "time",
+    "can",
+    "channels",
+    "truth",
+    "constants",
+)
 _CHANNEL_KEYS = ("name", "unit", "sign", "factor", "offset", "delay", "clock", "radius")
 _LARGEST = 1e9  # of factors, offsets and constants
 
@@ -86,6 +99,7 @@ class LogMap:
         follow_speed: whether the twin is to follow the measured speed.
         time_name: of the time's column; None: as the log has it.
         time_unit: [s]; None: as the log has it.
+        database: of the messages of a raw CAN log; None: the log is none.
         channels: where inputs and measurements come from, by our names.
         truth: where truth comes from.
         constants: of inputs that the log has not [SI].
@@ -98,6 +112,7 @@ class LogMap:
     follow_speed: bool
     time_name: str | None
     time_unit: float | None
+    database: Path | None
     channels: dict[str, Source]
     truth: dict[str, Source]
     constants: dict[str, float]
@@ -136,6 +151,7 @@ class LogMap:
             follow_speed=table.flag("follow_speed"),
             time_name=time.text("name"),
             time_unit=_time_unit(time),
+            database=_database(table),
             channels=_sources(table.table("channels"), allowed, axes),
             truth=_sources(table.table("truth"), MEASURABLE, axes),
             constants=_constants(table.table("constants")),
@@ -148,13 +164,23 @@ class LogMap:
         """What the reader of a log has to know of the map."""
         sources = (*self.channels.values(), *self.truth.values())
         return Wanted(
-            TimeWanted(self.time_name, self.time_unit), frozenset(s.name for s in sources)
+            TimeWanted(self.time_name, self.time_unit),
+            frozenset(s.name for s in sources),
+            self.database,
         )
 
     @property
     def input_names(self) -> tuple[str, ...]:
         """Inputs of the drive: all of ours, or all but the torques."""
         return tuple(name for name in INPUTS if not (self.follow_speed and name in TORQUES))
+
+
+def _database(table: Table) -> Path | None:
+    """The file that [can] names, beside the map."""
+    can = table.table("can")
+    can.check_keys(("database",))
+    name = can.text("database")
+    return None if name is None else Path(table.path).parent / name
 
 
 def _time_unit(table: Table) -> float | None:

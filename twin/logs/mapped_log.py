@@ -7,6 +7,7 @@ import numpy as np
 
 from twin.channels import FURTHER_OUTPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
+from twin.logs import can
 from twin.logs.drive import Drive
 from twin.logs.formats import format_of
 from twin.logs.map import TORQUES, LogMap, Source, unit_in_si
@@ -46,7 +47,8 @@ def load_drive(path: str | Path, map_path: str | Path) -> Drive:
         TwinError: the log or the map is missing or broken, they do not fit, or an input has gaps.
     """
     log_map = LogMap.load(map_path)
-    log = format_of(path).read_log(Path(path), log_map.wanted)
+    reader = can if log_map.database else format_of(path)
+    log = reader.read_log(Path(path), log_map.wanted)
     return drive_of(log, log_map)
 
 

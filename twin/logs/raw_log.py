@@ -28,10 +28,12 @@ class Wanted(NamedTuple):
     Attributes:
         time: of tables; files whose channels have times of their own take none.
         names: of the channels that are mapped; empty: all are wanted.
+        database: of a raw CAN log's messages; None: the log is none.
     """
 
     time: TimeWanted = TimeWanted()
     names: frozenset[str] = frozenset()
+    database: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
