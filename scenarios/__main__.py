@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from scenarios.cli import doctor, log_commands, study_commands, weigh_commands
+from scenarios.cli import car_commands, doctor, log_commands, study_commands, weigh_commands
 from scenarios.cli.options import Mistake
 from scenarios.cli.output import show_warning
 
@@ -75,6 +75,7 @@ def program(context: click.Context) -> None:
 
 for command in (
     *study_commands.COMMANDS,
+    *car_commands.COMMANDS,
     *log_commands.COMMANDS,
     *weigh_commands.COMMANDS,
     doctor.doctor,

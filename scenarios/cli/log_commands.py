@@ -1,4 +1,4 @@
-"""Commands of `til` for logs and other people's cars: inspect, new-car, calibrate, estimate."""
+"""Commands of `til` for logs and other people's cars: inspect, calibrate, estimate."""
 
 from pathlib import Path
 
@@ -35,13 +35,6 @@ def inspect(log: Path, map_path: Path | None, vehicle: str | None) -> None:
     Each finding names the line of the map that would mend it.
     """
     click.echo(catalogue.inspection()(log, map_path, vehicle))
-
-
-@click.command("new-car")
-@click.argument("name")
-def new_car(name: str) -> None:
-    """Write NAME.toml, a commented description of a car to fill in."""
-    click.echo(f"{catalogue.new_car()(name)} describes a car: change what you know of yours.")
 
 
 @click.command()
@@ -167,4 +160,4 @@ def estimate(
     return 2 if bad else 0
 
 
-COMMANDS = (inspect, new_car, calibrate, estimate)
+COMMANDS = (inspect, calibrate, estimate)

@@ -1,5 +1,6 @@
 """A car described in one TOML file, as an MJCF: `twin.car.fields` says which fields there are."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 import models
 from twin.car.fields import SECTIONS, Section
 from twin.car.mjcf import tyre_path
+from twin.car.rules import Figures, derived, settled
 from twin.errors import TwinError
 from twin.toml_fields import Field
 from twin.toml_file import Table, read_toml, reason, shown
 from twin.tyre.files import read_tyre_file
 from twin.tyre.interface import MAGIC_FORMULA, relaxation, stiffness
+from twin.tyre.size import tyre_text
 
 GRAVITY = 9.81  # [m/s2], as in models/suv.xml
 
@@ -64,33 +67,85 @@ def car_tyres(path: Path) -> np.ndarray:
     return np.array([_tyre(path, car, axle) for axle in ("front", "rear")])
 
 
-def write_template(name: str) -> Path:
-    """Writes NAME.toml, every field with its unit, range and default; returns its path.
+def write_template(name: str, figures: Figures | None = None) -> Path:
+    """Writes NAME.toml, every field with its unit, range and value; returns its path.
+
+    Args:
+        name: of the car.
+        figures: what is known of it; the rest follows by the rules of `twin.car.rules`. A tyre
+            of these figures is written beside it as NAME.tir. None: all values are the SUV's.
 
     Raises:
         TwinError: there is such a file already, or it cannot be written.
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
+    if figures and figures.tyre:
+        write_new(path, template(path.stem, figures))
+        try:
+            write_new(path.with_suffix(".tir"), tyre_text(figures.tyre, path.stem))
+        except TwinError:
+            path.unlink()
+            raise
+    else:
+        write_new(path, template(path.stem, figures))
+    return path
+
+
+def write_new(path: Path, text: str) -> None:
+    """Writes a file that must not be there yet.
+
+    Raises:
+        TwinError: there is such a file already, or it cannot be written.
+    """
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(template(path.stem))
+            file.write(text)
     except FileExistsError as error:
         raise TwinError(f"{path}: is there already; allowed: a name that is not taken") from error
     except (OSError, ValueError) as error:
         raise TwinError(f"{path}: cannot be written: {reason(error)}") from error
-    return path
 
 
-def template(title: str) -> str:
-    """The text of a car's file with all defaults, which are the SUV's."""
+def template(title: str, figures: Figures | None = None) -> str:
+    """The text of a car's file: all defaults, which are the SUV's, or derived from figures.
+
+    Values that nobody gave are repeated in the table `guessed`: one that is changed above it is no
+    guess any more, see `twin.car.guesses`.
+    """
+    rules = {} if figures is None else {k: float(f"{v:.5g}") for k, v in derived(figures).items()}
+    tyre = f"{title}.tir" if figures and figures.tyre else None
     lines = [
         f"# {title}: a car for `til ... --vehicle {title}.toml`. SI units; axes of ISO 8855 (x",
         "# forward, y left, z up). A field that is left out has the value it has here.",
     ]
     for section in SECTIONS:
         lines += ["", f"[{section.name}]", *(f"# {line}" for line in section.text if line)]
-        lines += [_line(field, section.optional) for field in section.fields]
+        for field in section.fields:
+            value = rules.get((section.name, field.name), field.default)
+            if tyre and isinstance(value, str):
+                value = tyre
+            lines.append(_line(field._replace(default=value), section.optional))
+    if figures is not None:
+        lines += ["", "# By rule, not by you: a field above that still has this value is a guess."]
+        lines += [
+            "[guessed]",
+            *(f'"{name}" = {value!r}' for name, value in _guessed(figures, rules)),
+        ]
     return "\n".join(lines) + "\n"
+
+
+def _guessed(
+    figures: Figures, rules: Mapping[tuple[str, str], float]
+) -> Iterator[tuple[str, float]]:
+    """The fields that no known figure settles, and their values."""
+    known = settled(figures)
+    for section in SECTIONS:
+        if section.optional:
+            continue
+        for field in section.fields:
+            if (section.name, field.name) not in known:
+                value = rules.get((section.name, field.name), field.default)
+                yield f"{section.name}.{field.name}", float(value)
 
 
 def _line(field: Field, optional: bool) -> str:
@@ -105,8 +160,11 @@ def _line(field: Field, optional: bool) -> str:
 def _check_tables(table: Table) -> None:
     """Checks the names of the tables and of the fields in them."""
     outer = {section.name.partition(".")[0] for section in SECTIONS}
-    table.check_keys(sorted(outer))
+    table.check_keys((*sorted(outer), "guessed"))
     for name, inner in table.tables():
+        if name == "guessed":
+            inner.check_keys(f"{s.name}.{field.name}" for s in SECTIONS for field in s.fields)
+            continue
         allowed = [s.name.partition(".")[2] for s in SECTIONS if s.name.startswith(f"{name}.")]
         if allowed:
             inner.check_keys(allowed)

@@ -1,0 +1,71 @@
+"""Commands of `til` for one's own car and tyres: new-car, new-tyre."""
+
+from pathlib import Path
+
+import click
+
+from scenarios.cli import catalogue
+
+_load_index = click.option(
+    "--load-index", type=int, metavar="N", help="The number behind the size on the tyre's side."
+)
+
+
+def _figure(name: str, unit: str, text: str):
+    return click.option(f"--{name}", type=float, metavar=unit, help=text)
+
+
+@click.command("new-car")
+@click.argument("name")
+@_figure("mass", "KG", "Of the whole car with its driver.")
+@_figure("wheelbase", "M", "Distance of the axles.")
+@_figure("track", "M", "Distance of left and right wheels, mean of both axles.")
+@_figure("front-share", "X", "Of the weight, on the front axle, as 0.6.")
+@click.option("--tyre", metavar="SIZE", help="As '205/55R16 91V'; writes NAME.tir, too.")
+@_load_index
+def new_car(
+    name: str,
+    mass: float | None,
+    wheelbase: float | None,
+    track: float | None,
+    front_share: float | None,
+    tyre: str | None,
+    load_index: int | None,
+) -> None:
+    """Write NAME.toml, a commented description of a car to fill in.
+
+    Without options every field has the value of the project's SUV. With them the other fields
+    follow by rules (inertias from mass and size, springs from ride frequencies, radii from the
+    tyre), and stay known as guesses until they are changed.
+    """
+    figures = {
+        "mass": mass,
+        "wheelbase": wheelbase,
+        "track": track,
+        "front_share": front_share,
+    }
+    given = {key: value for key, value in figures.items() if value is not None}
+    path = catalogue.new_car().new_car(name, given, tyre, load_index)
+    click.echo(f"{path} describes a car: change what you know of yours.")
+
+
+@click.command("new-tyre")
+@click.argument("size")
+@_load_index
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.tir",
+    help="[default: named after the size]",
+)
+def new_tyre(size: str, load_index: int | None, out: Path | None) -> None:
+    """Write a plausible tyre file (.tir) for a SIZE, as 205/55R16.
+
+    Radius, loads and vertical stiffness follow from the size; slip coefficients are those of the
+    project's SUV tyre. The file says which rule each number comes from.
+    """
+    path = catalogue.new_car().new_tyre(size, load_index, out)
+    click.echo(f"{path} describes a tyre; a car's file names it as tyre.front.file.")
+
+
+COMMANDS = (new_car, new_tyre)
