@@ -7,16 +7,16 @@ import pytest
 
 from estimators.til.law import ParameterLaw
 from estimators.til.observer import Observer
-from scenarios.driving.drivers import DRIVERS, LIMITS
+from scenarios.driving.drivers import driver_of, limits_of
 from scenarios.driving.manoeuvres import lane_changes, laps
-from scenarios.plants.commonroad import COMMONROAD_LIMITS, DT, LANE_CHANGE_LATERAL, record
+from scenarios.plants.commonroad import DT, LANE_CHANGE_LATERAL, commonroad_limits, record
 from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, TYRE_OUTPUTS, WHEELS, Twin, TwinError, Vehicle
 from twin.commonroad.model import GRAVITY, bmw_320i
 
 CAR = bmw_320i()
-COURSE = lane_changes(limits=COMMONROAD_LIMITS, lateral=LANE_CHANGE_LATERAL, duration=30.0)
+COURSE = lane_changes(limits=commonroad_limits(), lateral=LANE_CHANGE_LATERAL, duration=30.0)
 
-LAP = laps(limits=COMMONROAD_LIMITS, duration=30.0)
+LAP = laps(limits=commonroad_limits(), duration=30.0)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_torques_balance_tyre_forces_and_wheel_accelerations(drive):
 
 def test_torques_are_those_that_the_driver_asked_for(drive):
     """Drive behind only, and brakes in the fixed shares of the driver: the model adds nothing."""
-    driver = DRIVERS["bmw_320i"]
+    driver = driver_of(Vehicle.load("bmw_320i"))
     brake = inputs(drive, "brake_torque")
     share = brake[:, :2].sum(axis=1) / np.maximum(brake.sum(axis=1), 1e-9)
     np.testing.assert_allclose(share[brake.sum(axis=1) > 1.0], driver.brake_front, atol=1e-9)
@@ -184,7 +184,7 @@ def test_what_the_model_does_not_know_is_refused(changes):
 
 
 def test_a_drive_beyond_the_limits_of_the_model_is_refused():
-    driver = DRIVERS["bmw_320i"]._replace(proportional=1e5, pedal_rate=1e7)
-    fast = lane_changes(limits=LIMITS["sports_car"], lateral=1.3, duration=20.0)
+    driver = driver_of(Vehicle.load("bmw_320i"))._replace(proportional=1e5, pedal_rate=1e7)
+    fast = lane_changes(limits=limits_of(Vehicle.load("sports_car")), lateral=1.3, duration=20.0)
     with pytest.raises(TwinError, match=r"lane changes: at t = .* has come to rest, locked or lif"):
         record(fast, driver)

@@ -5,7 +5,6 @@ import pytest
 
 from estimators.benchmarks import double_track
 from estimators.benchmarks.double_track import Gains, MagicFormula, _axle, friction, slips
-from scenarios.driving.drivers import DRIVERS
 from scenarios.driving.manoeuvres import Manoeuvre
 from scenarios.driving.record import record
 from scenarios.tuning import double_track_fit
@@ -22,7 +21,7 @@ def turn(seconds=6.0, angle=0.25):
     manoeuvre = Manoeuvre(
         name="turn", dt=1e-3, speed=np.full(n, SPEED), steering=ramp, road=np.zeros((n, 4))
     )
-    return record(Vehicle.load("sports_car"), manoeuvre, DRIVERS["sports_car"])
+    return record(Vehicle.load("sports_car"), manoeuvre)
 
 
 @pytest.fixture(scope="module")

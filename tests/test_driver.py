@@ -6,10 +6,10 @@ from scipy.spatial import cKDTree
 
 from scenarios.driving.double_lane_change import lanes, length, stretch
 from scenarios.driving.driver import drive_along, new_memory
-from scenarios.driving.drivers import DRIVERS, LIMITS
+from scenarios.driving.drivers import LIMITS, driver_of, limits_of
 from scenarios.driving.manoeuvres import lane_changes, laps
 from scenarios.driving.record import record
-from twin import INPUTS, STATES, Twin, Vehicle
+from twin import INPUTS, STATES, PointMass, Twin, Vehicle
 
 G = 9.81
 LAP = 106.0  # [s], of the sports car
@@ -31,13 +31,13 @@ def aside(course, truth):
 
 
 def drive(car, manoeuvre):
-    return record(Vehicle.load(car), manoeuvre, DRIVERS[car]).truth
+    return record(Vehicle.load(car), manoeuvre).truth
 
 
 @pytest.fixture(scope="module")
 def lap():
-    manoeuvre = laps(duration=LAP)
-    return manoeuvre, record(Vehicle.load("sports_car"), manoeuvre, DRIVERS["sports_car"])
+    manoeuvre = laps(duration=LAP, limits=limits_of(Vehicle.load("sports_car")))
+    return manoeuvre, record(Vehicle.load("sports_car"), manoeuvre)
 
 
 def test_sports_car_keeps_within_a_metre_or_so_of_the_line(lap):
@@ -81,7 +81,7 @@ def test_limited_slip_differential_drives_the_slower_wheel_harder(lap):
 
 @pytest.mark.parametrize("car", ["suv", "bmw_320i"])
 def test_other_cars_keep_to_the_line_of_the_circuit_at_their_limits(car):
-    manoeuvre = laps(duration=60.0, limits=LIMITS[car])
+    manoeuvre = laps(duration=60.0, limits=limits_of(Vehicle.load(car)))
     truth = drive(car, manoeuvre)
     assert np.abs(aside(manoeuvre.course, truth)).max() < 0.5
     assert 0.55 * G < np.abs(truth["ay"]).max() < 0.8 * G
@@ -91,7 +91,10 @@ def test_other_cars_keep_to_the_line_of_the_circuit_at_their_limits(car):
 def test_lane_changes_touch_no_cone(car):
     lateral, speeds = CHANGES[car]
     truth = drive(
-        car, lane_changes(limits=LIMITS[car], lateral=lateral, speeds=speeds, straight=STRAIGHT)
+        car,
+        lane_changes(
+            limits=limits_of(Vehicle.load(car)), lateral=lateral, speeds=speeds, straight=STRAIGHT
+        ),
     )
     begin = 0.0
     for speed in speeds:
@@ -106,14 +109,15 @@ def test_lane_changes_touch_no_cone(car):
 
 
 def test_driver_called_from_other_code_does_what_he_does_in_a_recording():
-    manoeuvre = laps(duration=0.6, limits=LIMITS["suv"], start=30.0)
+    manoeuvre = laps(duration=0.6, limits=limits_of(Vehicle.load("suv")), start=30.0)
     expected = record(Vehicle.load("suv"), manoeuvre).inputs
     car, memory, u = Twin(Vehicle.load("suv")), new_memory(), np.zeros(len(INPUTS))
+    driver = driver_of(Vehicle.load("suv"))
     car.reset(manoeuvre.course.speed[0])
     for row in expected:
         state = dict(zip(STATES, car.read_states(), strict=True))
         drive_along(
-            DRIVERS["suv"], manoeuvre.course, memory, state["x"], state["y"], state["yaw"],
+            driver, manoeuvre.course, memory, state["x"], state["y"], state["yaw"],
             state["vx"], state["vy"], state["yaw_rate"], car.read_states()[24:], car.dt, u,
         )  # fmt: skip
         np.testing.assert_array_equal(u, row)
@@ -121,7 +125,7 @@ def test_driver_called_from_other_code_does_what_he_does_in_a_recording():
 
 
 def test_driver_finds_back_to_the_line():
-    manoeuvre = laps(duration=10.0, limits=LIMITS["suv"], start=20.0)
+    manoeuvre = laps(duration=10.0, limits=limits_of(Vehicle.load("suv")), start=20.0)
     moved = manoeuvre.course._replace(y=manoeuvre.course.y + 1.0)
     truth = drive("suv", type(manoeuvre)(
         name="moved", dt=manoeuvre.dt, course=moved, road=manoeuvre.road
@@ -131,15 +135,45 @@ def test_driver_finds_back_to_the_line():
     assert truth["y"].max() < 1.2
 
 
-@pytest.mark.parametrize("car", DRIVERS)
-def test_drivers_know_their_cars(car):
-    twin, driver, limits = Twin(Vehicle.load(car)), DRIVERS[car], LIMITS[car]
-    assert driver.wheelbase == pytest.approx(twin.car.wheelbase, rel=1e-3)
-    assert driver.steering_ratio == twin.car.steering_ratio
-    mass = twin.model.body_mass.sum()
-    assert (driver.mass, limits.mass) == pytest.approx((mass, mass), rel=1e-4)
-    assert driver.drag_area == limits.drag_area == twin.car.drag_area
-    numbers = [twin.model.numeric(i) for i in range(twin.model.nnumeric)]
-    lift = sum(number.data[0] for number in numbers if number.name.startswith("lift_area"))
-    assert limits.downforce_area == pytest.approx(lift)
-    assert limits.power <= driver.power
+@pytest.mark.parametrize("car", LIMITS)
+def test_limits_keep_the_engine_a_reserve(car):
+    vehicle = Vehicle.load(car)
+    assert limits_of(vehicle).power <= driver_of(vehicle).power
+
+
+@pytest.mark.parametrize("changed", [{"tyre_friction": 0.8}, {"drag": 1.2}])
+def test_driver_knows_the_car_by_its_files_only(changed):
+    vehicle = Vehicle.load("suv")
+    trunk = PointMass(name="trunk", mass=200.0, position=np.array([-1.5, 0.0, 0.0]))
+    other = vehicle.scaled(**changed).with_loads([trunk])
+    assert driver_of(other) == driver_of(vehicle)
+    assert limits_of(other) == limits_of(vehicle)
+
+
+VAN = """
+[chassis]
+mass = 1800
+cm_to_front_axle = 1.3
+cm_height = 0.7
+Jxx = 700
+Jyy = 3200
+Jzz = 3300
+[geometry]
+wheelbase = 3.0
+[steering]
+ratio = 14
+[drivetrain]
+drive_front = 1.0
+power = 90e3
+"""
+
+
+def test_users_car_drives_laps_with_no_more_than_its_file(tmp_path):
+    path = tmp_path / "van.toml"
+    path.write_text(VAN)
+    vehicle = Vehicle.load(path)
+    manoeuvre = laps(duration=40.0, limits=limits_of(vehicle))
+    made = record(vehicle, manoeuvre)
+    assert np.abs(aside(manoeuvre.course, made.truth)).max() < 1.0
+    assert np.abs(made.truth["ay"]).max() > 0.4 * G
+    assert not made.inputs[:, 3:5].any()  # front drive, as the file says

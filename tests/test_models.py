@@ -23,7 +23,6 @@ from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
 import models
-from scenarios.driving.drivers import DRIVERS
 from scenarios.driving.manoeuvres import Manoeuvre
 from scenarios.driving.record import record
 from twin import Twin, Vehicle
@@ -161,7 +160,7 @@ def test_bmw_turns_and_rolls_like_commonroads(speed, steer):
         name="turn", dt=0.001, speed=np.full(t.size, speed),
         steering=16.0 * steer * np.minimum(t / 0.5, 1.0), road=np.zeros((t.size, 4)),
     )  # fmt: skip
-    truth = record(Vehicle.load("bmw_320i"), manoeuvre, DRIVERS["bmw_320i"]).truth
+    truth = record(Vehicle.load("bmw_320i"), manoeuvre).truth
     yaw_rate, roll, acceleration = theirs(speed, steer, 3.0)
     assert 0.35 * G < acceleration < 0.6 * G
     assert truth["yaw_rate"][-1] == pytest.approx(yaw_rate, rel=0.035)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from scenarios.driving.drivers import limits_of
 from scenarios.driving.joint_drives import mixed
 from scenarios.driving.manoeuvres import lane_changes
 from scenarios.driving.record import Manoeuvre, record
@@ -81,7 +82,7 @@ def test_drives_of_one_car_are_equal(drives, suv):
 
 
 def test_random_car_follows_a_course(suv):
-    manoeuvre = lane_changes(duration=10.0)
+    manoeuvre = lane_changes(duration=10.0, limits=limits_of(Vehicle.load("sports_car")))
     drive = record_real(suv, random_car(4), manoeuvre)
     assert np.abs(drive.measurements[:, 1]).max() > 3.0
 

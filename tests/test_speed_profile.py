@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from scenarios.driving.circuit import circuit
-from scenarios.driving.drivers import LIMITS
+from scenarios.driving.drivers import LIMITS, limits_of
 from scenarios.driving.path import Piece, follow_on, path_of
 from scenarios.driving.speed_profile import GRAVITY, Limits, course_of, times
+from twin import Vehicle
 
 PLAIN = Limits(
     lateral=1.0, accelerating=0.5, braking=0.8, speed=60.0, power=1e9, mass=1000.0, drag_area=0.0
@@ -14,7 +15,7 @@ ARC = [Piece(400.0, 0.0, 0.0), Piece(20.0, 0.0, 0.02), Piece(60.0, 0.02, 0.02)]
 
 @pytest.mark.parametrize("car", LIMITS)
 def test_speed_on_the_circuit_respects_the_ellipse_of_friction(car):
-    limits = LIMITS[car]
+    limits = limits_of(Vehicle.load(car))
     course = course_of(follow_on([circuit()] * 2), limits, start=20.0)
     air = 0.5 * 1.2 * course.speed**2 / limits.mass
     grip = 1.0 + air * limits.downforce_area / GRAVITY
@@ -30,7 +31,7 @@ def test_speed_on_the_circuit_respects_the_ellipse_of_friction(car):
 
 @pytest.mark.parametrize("car", LIMITS)
 def test_speed_and_acceleration_of_a_course_belong_together(car):
-    course = course_of(circuit(), LIMITS[car], start=20.0)
+    course = course_of(circuit(), limits_of(Vehicle.load(car)), start=20.0)
     energy = 0.5 * course.speed**2
     gained = np.cumsum(0.5 * course.step * (course.acceleration[1:] + course.acceleration[:-1]))
     np.testing.assert_allclose(energy[1:] - energy[0], gained, atol=0.01 * energy.max())

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.driving.manoeuvres import suv_wheelbase
 from scenarios.driving.record import Manoeuvre, record
 from twin import Drive, Vehicle
 
 Array = NDArray[np.float64]
 
-WHEELBASE, TRACK = 2.9, 1.65  # of the SUV [m]: where a wheel meets the same bump
 DT = 0.001
 
 
@@ -26,7 +26,9 @@ def _ramps(parts: list[tuple[float, float]], n: int, dt: float) -> Array:
     return speed
 
 
-def rough_patches(distance: Array, starts: Array, length: float, sd: float, seed: int) -> Array:
+def rough_patches(
+    distance: Array, starts: Array, length: float, sd: float, seed: int, wheelbase: float
+) -> Array:
     """(N, 4) road heights [m] under the wheels, rough on patches and flat between them.
 
     Left and right are independent, the rear wheels follow in the track of the front ones. The
@@ -39,6 +41,7 @@ def rough_patches(distance: Array, starts: Array, length: float, sd: float, seed
         length: of each [m].
         sd: of the height within a patch [m].
         seed: of the road, the same for all noises.
+        wheelbase: by which the rear wheels follow [m].
     """
     grid = 0.05  # m
     places = np.arange(-10.0, distance[-1] + 20.0, grid)
@@ -58,17 +61,24 @@ def rough_patches(distance: Array, starts: Array, length: float, sd: float, seed
     heights *= sd * np.minimum(envelope, 1.0)[:, None]
     columns = [
         np.interp(distance - behind, places, heights[:, side])
-        for behind in (0.0, WHEELBASE)
+        for behind in (0.0, wheelbase)
         for side in (0, 1)
     ]
     return np.column_stack(columns)
 
 
-def mixed(dt: float = DT, duration: float | None = None) -> Manoeuvre:
+def mixed(
+    dt: float = DT, duration: float | None = None, *, wheelbase: float | None = None
+) -> Manoeuvre:
     """Two minutes of slaloms with braking, bends and rough patches between 11 and 22 m/s.
 
     Chosen by the Cramer-Rao bound: noise at a given SNR grows with the rms of a channel, so that
     slow bends cost more than they tell, and quick slaloms tell the roll and yaw inertia.
+
+    Args:
+        dt: sample time [s].
+        duration: how much of it [s]; all of it if None.
+        wheelbase: of the car, whose rear wheels meet the bumps later [m]; the SUV's if None.
     """
     whole = 120.0
     n = round(min(duration or whole, whole) / dt)
@@ -81,7 +91,9 @@ def mixed(dt: float = DT, duration: float | None = None) -> Manoeuvre:
     fade = np.clip(time / 0.5, 0.0, 1.0)
     steering = fade * (bends + slalom) * (15.0 / np.maximum(speed, 8.0))
     distance = np.cumsum(speed) * dt
-    road = rough_patches(distance, np.arange(15.0, 3000.0, 110.0), 90.0, 0.010, seed=11)
+    road = rough_patches(
+        distance, np.arange(15.0, 3000.0, 110.0), 90.0, 0.010, 11, wheelbase or suv_wheelbase()
+    )
     return Manoeuvre(name="mixed", dt=dt, speed=speed, steering=steering, road=road)
 
 

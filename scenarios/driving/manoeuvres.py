@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 
 from scenarios.driving.circuit import circuit
 from scenarios.driving.double_lane_change import lane_change, speeds_through, stretch
-from scenarios.driving.drivers import LIMITS
 from scenarios.driving.path import Piece, follow_on, path_of
 from scenarios.driving.record import CourseManoeuvre, Manoeuvre
 from scenarios.driving.speed_profile import GRAVITY, Course, Limits, course_of, times
+from twin import Vehicle
 from twin.road import random_walk_heights
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def random_road(
     duration: float | None = None,
     *,
     speed: float = 20.0,
-    wheelbase: float = 2.9,
+    wheelbase: float | None = None,
     seed: int = 0,
 ) -> Manoeuvre:
     """Straight on at constant speed over the random walk of TiL Eq. (16).
@@ -98,7 +98,7 @@ def random_road(
         dt: sample time [s].
         duration: [s]; a minute if None.
         speed: [m/s].
-        wheelbase: which the rear wheels follow behind [m].
+        wheelbase: which the rear wheels follow behind [m]; the SUV's if None.
         seed: of the road, the same for all laws and noises.
     """
     n = round((duration or 60.0) / dt)
@@ -109,15 +109,20 @@ def random_road(
         dt=dt,
         speed=np.full(n, speed),
         steering=np.zeros(n),
-        road=random_walk_heights(rng, time, delay=wheelbase / speed),
+        road=random_walk_heights(rng, time, delay=(wheelbase or suv_wheelbase()) / speed),
     )
+
+
+def suv_wheelbase() -> float:
+    """Of the car that the studies of one car drive [m]."""
+    return Vehicle.load("suv").figures.wheelbase
 
 
 def laps(
     dt: float = 0.001,
     duration: float | None = None,
     *,
-    limits: Limits = LIMITS["sports_car"],
+    limits: Limits,
     start: float = 20.0,
     count: int = 2,
 ) -> CourseManoeuvre:
@@ -143,7 +148,7 @@ def lane_changes(
     dt: float = 0.001,
     duration: float | None = None,
     *,
-    limits: Limits = LIMITS["sports_car"],
+    limits: Limits,
     lateral: float = 1.0,
     speeds: tuple[float, ...] = (25.0, 35.0, 30.0, 40.0, 22.0, 32.0),
     straight: float = 150.0,

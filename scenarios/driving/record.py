@@ -7,19 +7,26 @@ from numba import njit
 from numpy.typing import NDArray
 
 from scenarios.driving.driver import CREEP, Driver, drive_along, new_memory, pedals, torques
+from scenarios.driving.drivers import driver_of
 from scenarios.driving.speed_profile import Course
 from twin import (
+    BRAKE_TORQUES,
+    DRIVE_TORQUES,
     INPUTS,
     LOAD,
     OUTPUTS,
+    ROAD_HEIGHTS,
     SCALES,
+    SPINS,
     STATES,
     TYRE_OUTPUTS,
     WHEELS,
     Drive,
     Twin,
     TwinError,
+    U,
     Vehicle,
+    X,
 )
 from twin.kernel import is_sound, read_states, step
 
@@ -65,17 +72,23 @@ class CourseManoeuvre:
 def record(
     vehicle: Vehicle,
     manoeuvre: Manoeuvre | CourseManoeuvre,
-    driver: Driver = Driver(),  # noqa: B008
+    driver: Driver | None = None,
 ) -> Drive:
     """Drives a manoeuvre and records inputs, noise-free measurements and the truth.
 
     Truth holds every state by its name, sideslip [rad], the chassis' mass, CM and inertia, its
-    scales (1: as in the files), each
-    tyre's forces, moments and slips (`fx_fl` ...) and the noise-free outputs that are no state.
+    scales (1: as in the files), each tyre's forces, moments and slips (`fx_fl` ...) and the
+    noise-free outputs that are no state.
+
+    Args:
+        vehicle: the real one.
+        manoeuvre: what its driver is to do.
+        driver: who drives; by default who knows the car by its files.
 
     Raises:
         TwinError: the manoeuvre has another sample time than the vehicle, or the car blew up.
     """
+    driver = driver_of(vehicle) if driver is None else driver
     car = Twin(vehicle)
     if abs(manoeuvre.dt - car.dt) > 1e-9:
         raise TwinError(f"{manoeuvre.name}: sample time is {manoeuvre.dt} s, the car's {car.dt} s")
@@ -125,13 +138,13 @@ def _act(car, driver, speed, steering, road, inputs, outputs, states, tyres):
     integral, force = 0.0, 0.0
     for k in range(speed.size):
         read_states(car, states[k])
-        inputs[k, 0] = steering[k]
-        inputs[k, 9:13] = road[k]
+        inputs[k, U.steering_wheel_angle] = steering[k]
+        inputs[k, ROAD_HEIGHTS] = road[k]
         integral, force = pedals(
-            driver, speed[k], 0.0, states[k, 14], integral, force, driver.largest_force, car.dt
+            driver, speed[k], 0.0, states[k, X.vx], integral, force, driver.largest_force, car.dt
         )
-        if speed[k] == 0.0 and states[k, 14] < CREEP:
-            inputs[k, 1:5], inputs[k, 5:9] = 0.0, driver.holding_torque
+        if speed[k] == 0.0 and states[k, X.vx] < CREEP:
+            inputs[k, DRIVE_TORQUES], inputs[k, BRAKE_TORQUES] = 0.0, driver.holding_torque
         else:
             torques(driver, force, inputs[k])
         step(car, inputs[k], outputs[k])
@@ -147,10 +160,10 @@ def _follow(car, driver, course, memory, road, inputs, outputs, states, tyres):
     for k in range(road.shape[0]):
         x = states[k]
         read_states(car, x)
-        inputs[k, 9:13] = road[k]
+        inputs[k, ROAD_HEIGHTS] = road[k]
         drive_along(
-            driver, course, memory, x[0], x[1], x[5], x[14], x[15], x[19], x[24:28],
-            car.dt, inputs[k],
+            driver, course, memory, x[X.x], x[X.y], x[X.yaw], x[X.vx], x[X.vy], x[X.yaw_rate],
+            x[SPINS], car.dt, inputs[k],
         )  # fmt: skip
         step(car, inputs[k], outputs[k])
         tyres[k] = car.tyre_output

@@ -18,7 +18,7 @@ from estimators.base import Estimate
 from estimators.benchmarks import double_track, static_map
 from estimators.til import state_and_mass
 from estimators.til.observer import Observer
-from scenarios.driving.drivers import DRIVERS, LIMITS
+from scenarios.driving.drivers import driver_of, limits_of
 from scenarios.driving.manoeuvres import lane_changes, laps
 from scenarios.driving.record import CourseManoeuvre, record
 from scenarios.plants.mismatch import MISMATCHES, real_drive, real_vehicle
@@ -110,16 +110,16 @@ def clean_drive(case: str, drive: str, duration: float | None) -> Drive:
         return commonroad.record(manoeuvre(case, drive, duration))
     car = twin_of(case)
     vehicle = real_vehicle(Vehicle.load(car), MISMATCHES[case])
-    return record(vehicle, manoeuvre(case, drive, duration), DRIVERS[car])
+    return record(vehicle, manoeuvre(case, drive, duration), driver_of(vehicle))
 
 
 def manoeuvre(case: str, drive: str, duration: float | None) -> CourseManoeuvre:
     """What the real vehicle is to do."""
     if case != COMMONROAD:
-        return DRIVES[drive](duration=duration, limits=LIMITS[TWIN])
+        return DRIVES[drive](duration=duration, limits=limits_of(Vehicle.load(TWIN)))
     from scenarios.plants import commonroad
 
-    limits = commonroad.COMMONROAD_LIMITS
+    limits = commonroad.commonroad_limits()
     if drive == "laps":
         return laps(duration=duration, limits=limits)
     return lane_changes(duration=duration, limits=limits, lateral=commonroad.LANE_CHANGE_LATERAL)

@@ -19,9 +19,23 @@ from numba import njit
 from numpy.typing import NDArray
 
 from scenarios.driving.driver import Driver, drive_along, new_memory
-from scenarios.driving.drivers import DRIVERS, LIMITS
+from scenarios.driving.drivers import driver_of, limits_of
 from scenarios.driving.record import CourseManoeuvre
-from twin import INPUTS, OUTPUTS, PARAMETERS, TYRE_OUTPUTS, WHEELS, Drive, TwinError
+from scenarios.driving.speed_profile import Limits
+from twin import (
+    BRAKE_TORQUES,
+    DRIVE_TORQUES,
+    INPUTS,
+    OUTPUTS,
+    PARAMETERS,
+    TYRE,
+    TYRE_OUTPUTS,
+    WHEELS,
+    Drive,
+    TwinError,
+    U,
+    Vehicle,
+)
 from twin.commonroad.axes import COMMONROAD_STATES, measurements, our_states, suspensions
 from twin.commonroad.model import STATES as THEIRS
 from twin.commonroad.model import (
@@ -45,22 +59,25 @@ from twin.commonroad.tyres import tyre_outputs
 Array = NDArray[np.float64]
 
 DT = 1e-3  # [s]
-FX, FZ = TYRE_OUTPUTS.index("fx"), TYRE_OUTPUTS.index("fz")
 
-# What is asked of the driver, so that the car stays below 0.6 g: he corrects himself, and takes a
-# lane change a quarter harder than its line. Chosen: far from 1 g, where wheels lift.
-COMMONROAD_LIMITS = dataclasses.replace(LIMITS["bmw_320i"], lateral=0.54, braking=0.54)
+# So that the car stays below 0.6 g: the driver corrects himself, and takes a lane change a quarter
+# harder than its line. Chosen: far from 1 g, where wheels lift.
 LANE_CHANGE_LATERAL = 0.45  # [g]
 
 
+def commonroad_limits() -> Limits:
+    """What is asked of the driver of CommonRoad's car."""
+    return dataclasses.replace(limits_of(Vehicle.load("bmw_320i")), lateral=0.54, braking=0.54)
+
+
 def record(
-    manoeuvre: CourseManoeuvre, driver: Driver = DRIVERS["bmw_320i"], car: MultiBody | None = None
+    manoeuvre: CourseManoeuvre, driver: Driver | None = None, car: MultiBody | None = None
 ) -> Drive:
     """Drives the car and records inputs, noise-free measurements and the truth.
 
     Args:
         manoeuvre: above 2 m/s, on a flat road, sampled at 1 kHz.
-        driver: who drives, and what he knows of the car.
+        driver: who drives, and what he knows of the car; our twin's driver if None.
         car: parameters; the nominal car if None.
 
     Raises:
@@ -68,6 +85,7 @@ def record(
             a wheel locked or off the road, blown up.
     """
     car = bmw_320i() if car is None else car
+    driver = driver_of(Vehicle.load("bmw_320i")) if driver is None else driver
     if abs(manoeuvre.dt - DT) > 1e-9 or manoeuvre.road.any():
         raise TwinError(
             f"{manoeuvre.name}: CommonRoad's car needs a flat road and samples every {DT} s, "
@@ -78,14 +96,14 @@ def record(
     states[0] = rolling(car, float(manoeuvre.course.speed[0]))
     done = _follow(car, driver, manoeuvre.course, new_memory(), inputs, states, rates)
     forces = tyre_outputs(car, states[: done or 1].T)
-    lifted = np.flatnonzero((forces[:, FZ] <= 0.0).any(axis=0))
+    lifted = np.flatnonzero((forces[:, TYRE.fz] <= 0.0).any(axis=0))
     done = min([done, *lifted])
     if done < n:
         raise TwinError(
             f"{manoeuvre.name}: at t = {done * DT:.3f} s CommonRoad's car has come to rest, locked "
             "or lifted a wheel or blown up; its model needs 2 m/s and wheels that roll on the road"
         )
-    _set_torques(car, rates, forces[:, FX], inputs)
+    _set_torques(car, rates, forces[:, TYRE.fx], inputs)
     measured = measurements(states.T, rates.T)
     return Drive(
         time=np.arange(n) * DT,
@@ -109,8 +127,8 @@ def _follow(car, driver, course, memory, inputs, states, rates):
             driver, course, memory, x[X], -x[Y], -x[YAW], x[VX], -x[VY], -x[YAW_RATE],
             x[WHEEL : WHEEL + 4], DT, u,
         )  # fmt: skip
-        angle += min(max(u[0] - angle, -turn), turn)
-        u[0] = angle
+        angle += min(max(u[U.steering_wheel_angle] - angle, -turn), turn)
+        u[U.steering_wheel_angle] = angle
         states[k] = x
         rates[k] = advance(car, x, u, STEERING_RATIO, DT, torque)
         states[k, STEER] = x[STEER]
@@ -122,7 +140,8 @@ def _follow(car, driver, course, memory, inputs, states, rates):
 def _set_torques(car: MultiBody, rates: Array, fx: Array, inputs: Array) -> None:
     """Fills drive and brake torques with what tyre forces and wheel accelerations amount to."""
     torque = car.I_y_w * rates[:, WHEEL : WHEEL + 4] + car.R_w * fx.T
-    inputs[:, 1:5], inputs[:, 5:9] = np.maximum(torque, 0.0), np.maximum(0.0, -torque)
+    inputs[:, DRIVE_TORQUES] = np.maximum(torque, 0.0)
+    inputs[:, BRAKE_TORQUES] = np.maximum(0.0, -torque)
 
 
 def _truth(car: MultiBody, x: Array, measured: Array, forces: Array) -> dict[str, Array]:

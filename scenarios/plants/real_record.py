@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from scenarios.driving.driver import CREEP, Driver, drive_along, new_memory, pedals, torques
+from scenarios.driving.drivers import driver_of
 from scenarios.driving.record import CourseManoeuvre, Manoeuvre, truth_of
 from scenarios.plants.random_car import RealCar
 from scenarios.plants.real_parts import act_on, blow, parts_of, suspend, turn_wheels
@@ -38,7 +39,7 @@ def record_real(
     vehicle: Vehicle,
     real: RealCar,
     manoeuvre: Manoeuvre | CourseManoeuvre,
-    driver: Driver = Driver(),  # noqa: B008
+    driver: Driver | None = None,
 ) -> Drive:
     """Drives a manoeuvre and records what is told of the inputs, perfect measurements, the truth.
 
@@ -49,11 +50,12 @@ def record_real(
         vehicle: the twin's, with the loads on board.
         real: how the car differs.
         manoeuvre: what is driven.
-        driver: who drives.
+        driver: who drives; by default who knows the car by its files.
 
     Raises:
         TwinError: the manoeuvre has another sample time than the vehicle, or the car blew up.
     """
+    driver = driver_of(vehicle) if driver is None else driver
     changed = real_vehicle(vehicle, real)
     twin = Twin(changed)
     if abs(manoeuvre.dt - twin.dt) > 1e-9:

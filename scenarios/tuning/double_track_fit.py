@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import models
 from estimators.benchmarks.double_track import Axle, DoubleTrack, MagicFormula, slips
-from scenarios.driving.drivers import DRIVERS
+from scenarios.driving.drivers import driver_of
 from scenarios.driving.manoeuvres import Manoeuvre
 from scenarios.driving.record import record
 from scenarios.experiment.result import replacing, versions
@@ -47,7 +47,8 @@ def path(car: str) -> Path:
 
 def fit(name: str) -> DoubleTrack:
     """The double track of a car of the project."""
-    vehicle, driver = Vehicle.load(name), DRIVERS[name]
+    vehicle = Vehicle.load(name)
+    driver = driver_of(vehicle)
     twin = Twin(vehicle)
     twin.reset(SPEEDS[1])
     ratio = float(twin.car.steering_ratio)

@@ -117,6 +117,15 @@ SECTIONS = (
         ),
     ),
     Section(
+        "drivetrain",
+        ("What drivers of simulated drives, and twins without known torques, take the car for.",),
+        (
+            Field("drive_front", "1", 0.4, 0.0, 1.0, "share of the drive torque"),
+            Field("brake_front", "1", 0.65, 0.0, 1.0, "share of the brake torque"),
+            Field("power", "W", 250_000.0, 1e3, 1e7, "of the engine at the wheels"),
+        ),
+    ),
+    Section(
         "aerodynamics",
         (),
         (

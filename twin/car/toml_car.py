@@ -51,7 +51,8 @@ def car_spec(path: Path) -> mujoco.MjSpec:
     for axle, tyre in zip(("front", "rear"), car_tyres(path), strict=True):
         _set_axle(spec, car, axle, float(tyre["unloaded_radius"]))
     steering, air = car["steering"], car["aerodynamics"]
-    numbers = {"steering_ratio": steering["ratio"], "ackermann": steering["ackermann"], **air}
+    numbers = {"steering_ratio": steering["ratio"], "ackermann": steering["ackermann"]}
+    numbers |= air | car["drivetrain"]
     for name, value in numbers.items():
         spec.numeric(name).data = [value]
     return spec

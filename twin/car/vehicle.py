@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 import models
+from twin.car.figures import OPTIONAL, Figures, Grip, figures_of, grip_of, number
 from twin.car.geometry import check_geometry
 from twin.car.load import PointMass, RigidBody
 from twin.car.mjcf import read_mjcf, tyre_path
@@ -18,19 +20,19 @@ from twin.parameters import LARGEST_SCALE, LEAST_SCALE
 from twin.scales import VEHICLE_SCALES, scale_model, scale_tyres
 from twin.tyre.files import read_tyre_file
 
-# Numbers of <custom> that every car needs, with the least that is allowed
+# Numbers of <custom> that every car needs, with the least and largest that are allowed
 NUMBERS = {
-    "steering_ratio": 1e-3,
-    "ackermann": 0.0,
-    "drag_area": 0.0,  # c_D A [m2]
-    "lift_area_front": -10.0,  # -c_L A of each axle [m2], positive pushes down
-    "lift_area_rear": -10.0,
+    "steering_ratio": (1e-3, np.inf),
+    "ackermann": (0.0, np.inf),
+    "drag_area": (0.0, np.inf),  # c_D A [m2]
+    "lift_area_front": (-10.0, np.inf),  # -c_L A of each axle [m2], positive pushes down
+    "lift_area_rear": (-10.0, np.inf),
 }
 # Sensors that measure the outputs, and the kind of each
 SENSORS = {CHANNEL[name].sensor: CHANNEL[name].sensor_kind for name in OUTPUTS}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Vehicle:
     """A car by its files, and what it carries. It can be pickled; a `Twin` of it cannot.
 
@@ -155,11 +157,13 @@ class Vehicle:
             mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
         ):
             raise TwinError(f"{self.source}: option integrator must be Euler or implicitfast")
-        for name, least in NUMBERS.items():
-            value = model.numeric(name).data[0]
-            if not least <= value < np.inf:
+        optional = {name: bounds[1:] for name, bounds in OPTIONAL.items()}
+        for name, (least, largest) in (NUMBERS | optional).items():
+            value = number(model, name)
+            if not (least <= value <= largest and value < np.inf):
+                upper = "" if largest == np.inf else f" and at most {largest:g}"
                 raise TwinError(
-                    f"{self.source}: numeric {name} is {value}; allowed: at least {least}"
+                    f"{self.source}: numeric {name} is {value}; allowed: at least {least}{upper}"
                 )
         check_geometry(self.source, model)
 
@@ -177,6 +181,24 @@ class Vehicle:
         tyres = np.array([read[0], read[0], read[1], read[1]], dtype=read[0].dtype)
         scale_tyres(tyres, dict(self.scales))
         return tyres
+
+    @cached_property
+    def figures(self) -> Figures:
+        """Masses, sizes, steering, drive and air of the car with its loads.
+
+        Raises:
+            TwinError: a file is missing or broken.
+        """
+        return figures_of(self.compile(), self.tyres())
+
+    @cached_property
+    def grip(self) -> Grip:
+        """Cornering stiffness and friction of the axles.
+
+        Raises:
+            TwinError: a file is missing or broken.
+        """
+        return grip_of(self.figures, self.tyres())
 
     def chassis(self) -> RigidBody:
         """Mass, CM and inertia of the chassis and all that is fixed to it, in the chassis frame."""
