@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from estimators.weigh.calibration import Calibration
+from estimators.weigh.losses import TERMS
+from estimators.weigh.scatter import Scatter
 from estimators.weigh.trip import Trip
 
 DT = 0.1
@@ -81,3 +84,15 @@ def smooth(values, samples):
     window = np.ones(samples) / samples
     averaged = np.convolve(np.convolve(values, window, "same"), window, "same")
     return averaged * values.std() / averaged.std()
+
+
+def ideal(mass, rotating_mass, drag_area=0.69):
+    """The calibration of a car whose log tells the true torques."""
+    scatter = Scatter(
+        scale=1.0, scale_sd=0.001, effect=0.0, rolling=0.1, tau=0.01, phi=1.0, trips=20.0,
+        as_declared=np.ones(20),
+    )  # fmt: skip
+    return Calibration(
+        mass=mass, mass_sd=20.0, rotating_mass=rotating_mass, losses=np.zeros(len(TERMS)),
+        scatter=scatter, drag_area=drag_area, noise=1.0, hardest_rolling=0.2,
+    )  # fmt: skip

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.weigh.losses import TERMS, fit_losses, fit_trip
+from estimators.weigh.losses import TERMS, fit_losses, fit_trip, terms
 from estimators.weigh.regression import Fit
-from estimators.weigh.samples import Samples
+from estimators.weigh.samples import Samples, coldness
 from estimators.weigh.scatter import Scatter, fit_scatter
+from estimators.weigh.trip import Trip
 from twin import TwinError
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ LEAST_REFERENCES = 4
 LEAST_AGREEMENT = 0.94
 # Standard deviation of the scale from one season, tyre or driver to the next; chosen
 DRIFT = 0.01
+HALF_AIR_DENSITY = 0.6  # [kg/m3]
 _ROUNDS = 20
 
 
@@ -38,6 +40,7 @@ class Calibration:
         rotating_mass: of wheels, gears and motor, sum(J / R^2) [kg].
         losses: (k,) of `losses.TERMS`.
         scatter: scale of the torques, and how trips differ.
+        drag_area: c_d A that the references show, the median, by the scale of the torques [m2].
         noise: of a reference trip's residuals, the median, in units of the assumed.
         hardest_rolling: the largest deceleration among the references [m/s2].
     """
@@ -47,6 +50,7 @@ class Calibration:
     rotating_mass: float
     losses: Array
     scatter: Scatter
+    drag_area: float
     noise: float
     hardest_rolling: float
 
@@ -54,6 +58,12 @@ class Calibration:
     def inertial_mass(self) -> float:
         """Of the car without load, rotating parts included [kg]."""
         return self.mass + self.rotating_mass
+
+    def effective_force(self, trip: Trip) -> Array:
+        """(N,) force at the wheels by scale and losses [N]; zero where the log has a gap."""
+        force, speed = np.nan_to_num(trip.force), np.nan_to_num(trip.speed)
+        phi = terms(force, speed, coldness(force, speed, trip.dt))
+        return (force + phi @ self.losses) / self.scatter.scale
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,12 +106,15 @@ def calibrate(
         )
     declared = np.array([mass + rotating_mass + reference.load for reference, _ in pairs])
     ratio, ratio_sd, rolling = _ratios([fit for _, fit in pairs], declared)
+    scatter = fit_scatter(ratio, ratio_sd, rolling, declared)
+    drag = [fit.drag * fit.mass for _, fit in pairs]
     return Calibration(
         mass=mass,
         mass_sd=mass_sd,
         rotating_mass=rotating_mass,
         losses=losses,
-        scatter=fit_scatter(ratio, ratio_sd, rolling, declared),
+        scatter=scatter,
+        drag_area=float(np.median(drag)) / (HALF_AIR_DENSITY * scatter.scale),
         noise=float(np.median([fit.noise for _, fit in pairs])),
         hardest_rolling=float(rolling.max()),
     )

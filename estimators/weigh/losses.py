@@ -33,15 +33,14 @@ ROUNDS = 10
 TOLERANCE = 1e-3  # of the prior's standard deviation
 
 
-def terms(samples: Samples) -> Array:
-    """(n, k) terms phi of `TERMS`."""
-    force = samples.force
+def terms(force: Array, speed: Array, cold: Array) -> Array:
+    """(n, k) terms phi of `TERMS`, of signals (n,) as in `Samples`."""
     return np.column_stack(
         (
             np.minimum(force, 0.0),
             np.tanh(force / FRICTION_FORCE),
-            force * samples.speed / UNIT_SPEED,
-            force * samples.cold,
+            force * speed / UNIT_SPEED,
+            force * cold,
         )
     )
 
@@ -99,7 +98,7 @@ def _white(samples: Samples) -> Array:
             samples.force,
             np.ones_like(samples.force),
             samples.speed_squared,
-            terms(samples),
+            terms(samples.force, samples.speed, samples.cold),
         )
     )
     return whitened(columns, samples.first, samples.step)

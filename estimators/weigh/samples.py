@@ -67,14 +67,14 @@ def samples_of(trip: Trip) -> Samples:
     agreement, delay = _agreement(speed, measured, trip.dt)
     shifted = np.interp(trip.time + delay, trip.time, speed)
     acceleration = _blend(np.gradient(shifted, trip.dt), measured, trip.dt)
-    energy = np.cumsum(np.abs(force * speed)) * trip.dt
+    cold = coldness(force, speed, trip.dt)
     size = max(1, round(BLOCK * trip.rate))
-    usable = _usable(trip, speed)
+    allowed = usable(trip)
 
     def means(values: Array) -> Array:
         return _blocks(values, size).mean(axis=1)
 
-    block = np.flatnonzero(_blocks(usable, size).all(axis=1))
+    block = np.flatnonzero(_blocks(allowed, size).all(axis=1))
     block = block[_long_enough(block, SHORTEST / (size * trip.dt))]
     return Samples(
         time=means(trip.time - trip.time[0])[block],
@@ -83,27 +83,32 @@ def samples_of(trip: Trip) -> Samples:
         speed=means(speed)[block],
         speed_squared=means(speed**2)[block],
         acceleration=means(acceleration)[block],
-        cold=np.exp(-means(energy)[block] / WARMING),
+        cold=means(cold)[block],
         step=size * trip.dt,
         agreement=agreement,
         delay=delay,
     )
 
 
-def _usable(trip: Trip, speed: Array) -> NDArray[np.bool_]:
-    """(N,) where no friction brake can act and every signal is there."""
+def coldness(force: Array, speed: Array, dt: float) -> Array:
+    """(N,) 1 at the start, towards 0 with the energy that went through motor and gears."""
+    return np.exp(-np.cumsum(np.abs(force * speed)) * dt / WARMING)
+
+
+def usable(trip: Trip) -> NDArray[np.bool_]:
+    """(N,) where no friction brake can act, the car rolls and every signal is there."""
     if trip.pedal is not None:
-        usable = np.nan_to_num(trip.pedal) > LEAST_PEDAL
+        allowed = np.nan_to_num(trip.pedal) > LEAST_PEDAL
     else:
-        usable = np.nan_to_num(trip.force) > LEAST_FORCE
+        allowed = np.nan_to_num(trip.force) > LEAST_FORCE
     if trip.brake is not None:
-        usable &= np.nan_to_num(trip.brake, nan=np.inf) <= 0.0
-    usable &= speed > LEAST_SPEED
+        allowed &= np.nan_to_num(trip.brake, nan=np.inf) <= 0.0
+    allowed &= np.nan_to_num(trip.speed) > LEAST_SPEED
     for values in (trip.force, trip.speed, trip.acceleration):
-        usable &= np.isfinite(values)
+        allowed &= np.isfinite(values)
     reach = round(GUARD * trip.rate)
-    unusable = np.convolve(~usable, np.ones(2 * reach + 1), "same")
-    return unusable < 0.5
+    forbidden = np.convolve(~allowed, np.ones(2 * reach + 1), "same")
+    return forbidden < 0.5
 
 
 def _long_enough(block: NDArray[np.int64], least: float) -> NDArray[np.bool_]:

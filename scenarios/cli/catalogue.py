@@ -77,7 +77,7 @@ def _without_gains(*_: object) -> NoReturn:
 def _without_picture(*_: object) -> NoReturn:
     from twin.errors import TwinError  # not at the top: it imports NumPy
 
-    raise TwinError("run: this scenario draws no picture; allowed: --png with ferrari")
+    raise TwinError("run: this scenario draws no picture; allowed: --png with ferrari or i3")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,6 +158,10 @@ SCENARIOS = {
     "ferrari": Entry(
         "scenarios.ferrari:SCENARIO", "a measured lap: the sideslip of a Ferrari 250 LM"
     ),
+    "weigh": Entry(
+        "scenarios.weigh:SCENARIO", "a simulated car in traffic is weighed from what its bus shows"
+    ),
+    "i3": Entry("scenarios.i3:SCENARIO", "48 measured trips: the loads of a BMW i3"),
 }
 
 _STATES = "scenarios.papers.state_figures"

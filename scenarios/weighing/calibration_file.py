@@ -20,6 +20,7 @@ _CAR = {
     "mass": ("kg", 100.0, 1e5),
     "mass_sd": ("kg", 0.0, 1e4),
     "rotating_mass": ("kg", 0.0, 1e4),
+    "drag_area": ("m2", -10.0, 100.0),
 }
 _SCATTER = {
     "scale": ("1", 1e-3, 1e3),
