@@ -247,6 +247,8 @@ def _of_steering(signals: Signals, speed: str, car: CarFacts | None) -> Iterator
     for axle, (left, right) in {"front": WHEEL_SPEEDS[:2], "rear": WHEEL_SPEEDS[2:]}.items():
         if not signals.has(left, right):
             continue
+        if np.array_equal(signals.known[left], signals.known[right]):
+            continue  # one speed for all wheels
         difference = (signals.known[right] - signals.known[left]) * radius / track
         if signals.has("yaw_rate"):
             yield Equation(

@@ -24,6 +24,7 @@ from scenarios.logs.findings import Finding, findings
 from scenarios.logs.pieces import lacking, measured, prepared
 from twin import PARAMETERS, Drive, TwinError, Vehicle
 from twin.car.fingerprint import fingerprint
+from twin.car.signals import signals_of
 from twin.logs.mapped_log import NEEDS
 from twin.logs.raw_log import check_file_size
 from twin.toml_file import reason
@@ -175,7 +176,7 @@ def fingerprint_of(task: Task) -> str:
 def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
     """What the estimator finds, and what was done before."""
     vehicle = Vehicle.load(task.vehicle)
-    drive = Drive.load(task.log, task.map)
+    drive = Drive.load(task.log, task.map, signals_of(vehicle))
     log = prepared(drive, float(vehicle.compile().opt.timestep))
     told = tuple(drive.settings.get("log", {}).get("done", ()))
     if not told:

@@ -7,6 +7,7 @@ import numpy as np
 from scenarios.logs.checks import Check, checks
 from scenarios.logs.findings import findings
 from twin import Drive, Vehicle
+from twin.car.signals import signals_of
 from twin.logs.drive import NoDrive
 from twin.logs.formats import format_of
 from twin.logs.raw_log import Channel, RawLog, Wanted
@@ -39,7 +40,7 @@ def inspect_log(path: Path, map_path: Path | None, vehicle: str | None = None) -
 
     log_map = LogMap.load(map_path)
     log = format_of(path).read_log(path, log_map.wanted)
-    drive = drive_of(log, log_map)
+    drive = drive_of(log, log_map, signals_of(car) if car else None)
     done = "\n".join(f"  {line}" for line in drive.settings["log"]["done"])
     return f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive, car)}"
 

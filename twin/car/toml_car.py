@@ -12,6 +12,7 @@ from twin.car.fields import SECTIONS, Section
 from twin.car.mjcf import tyre_path
 from twin.car.rules import Figures, derived, settled
 from twin.errors import TwinError
+from twin.logs.car_signals import TEMPLATE, CarSignals
 from twin.toml_fields import Field
 from twin.toml_file import Table, read_toml, reason, shown
 from twin.tyre.files import read_tyre_file
@@ -33,6 +34,7 @@ def read_car(path: Path) -> Car:
     """
     table = read_toml(path)
     _check_tables(table)
+    CarSignals.of(table.table("signals"))
     return {section.name: _read_section(table, section) for section in SECTIONS}
 
 
@@ -132,7 +134,7 @@ def template(title: str, figures: Figures | None = None) -> str:
             "[guessed]",
             *(f'"{name}" = {value!r}' for name, value in _guessed(figures, rules)),
         ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + TEMPLATE
 
 
 def _guessed(
@@ -160,7 +162,7 @@ def _line(field: Field, optional: bool) -> str:
 
 def _check_tables(table: Table) -> None:
     """Checks the names of the tables and of the fields in them."""
-    outer = {section.name.partition(".")[0] for section in SECTIONS}
+    outer = {section.name.partition(".")[0] for section in SECTIONS} | {"signals"}
     table.check_keys((*sorted(outer), "guessed"))
     for name, inner in table.tables():
         if name == "guessed":

@@ -6,7 +6,7 @@ import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from twin.errors import TwinError
 from twin.logs.formats import format_of
 from twin.toml_file import reason
+
+if TYPE_CHECKING:
+    from twin.logs.car_signals import CarSignals
 
 FORMAT_VERSION = 1
 # Samples count as uniform when no step differs by more than this from the mean one, relatively.
@@ -215,12 +218,15 @@ class Drive:
             partial.unlink(missing_ok=True)
 
     @classmethod
-    def load(cls, path: str | Path, map: str | Path | None = None) -> "Drive":
+    def load(
+        cls, path: str | Path, map: str | Path | None = None, car: "CarSignals | None" = None
+    ) -> "Drive":
         """Reads what `save` wrote, to the bit, or a log of anybody by its map.
 
         Args:
             path: the file.
             map: a TOML file, see `twin.logs.map`; `twin.logs.mapped_log` says what comes of it.
+            car: what the car makes of its signals (`Vehicle.signals`), for a log by its map.
 
         Raises:
             NoDrive: the file is another program's log, and there is no map.
@@ -230,7 +236,7 @@ class Drive:
         if map is not None:
             from twin.logs.mapped_log import load_drive
 
-            return load_drive(path, map)
+            return load_drive(path, map, car)
         columns, metadata = format_of(path).read_columns(path)
         if metadata is None:
             raise NoDrive(

@@ -5,6 +5,9 @@
     longest_gap = 0.1       # up to so many seconds are interpolated
     follow_speed = false    # true: no torques in the log, the twin follows the measured vx
 
+    free_of_gravity = false # true: accelerations of motion (GNSS/INS), not what an accelerometer
+                            # shows, its specific force: at rest 9.81 m/s2 upwards
+
     [time]                  # tables; MDF, MCAP and ROS 2 bags have times of their own
     name = "t"              # by default the column that is called time, or declared to be it
     unit = "s"              # by default the one that the log gives; none for timestamps
@@ -27,6 +30,16 @@
     [constants]             # inputs that the log has not; road_height means that of all four wheels
     road_height = 0.0
 
+    [car]                   # what turns signals of cars into ours, if the car's file says nothing
+    final_drive = 9.1       # beside: gear_ratios, efficiency, driven, front_share,
+    driven = "rear"         # brake_torque_per_bar_front and _rear (both wheels, N m per bar),
+                            # steering_ratio, radius
+
+Instead of ours, [channels] may have signals as cars have them: `motor_torque` (or `_front` and
+`_rear`) with `gear`; `brake_pressure` (or `_front` and `_rear`); `road_wheel_angle`; `speed`, one
+for all wheels; `course` over ground; and, for accelerations free of gravity, `slope` (uphill
+positive) and `bank` (the road's left side higher), as angles or in %. See `twin.logs.car_signals`.
+
 A number v of the log becomes sign * unit * factor * (v - offset). In SAE axes y points to the right
 and z down: signs of ay, az, pitch and yaw rate, pitch, v_y, sideslip and hand wheel turn round.
 """
@@ -38,6 +51,7 @@ from typing import Any
 
 from twin.channels import FURTHER_OUTPUTS, INPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
+from twin.logs.car_signals import GIVES, CarSignals
 from twin.logs.log_time import TimeWanted
 from twin.logs.raw_log import Wanted
 from twin.logs.units import UNITS, in_si, kind_of
@@ -46,18 +60,21 @@ from twin.toml_file import Table, read_toml
 TORQUES = tuple(name for name in INPUTS if "torque" in name)
 MEASURABLE = (*OUTPUTS, *FURTHER_OUTPUTS)
 # What turns its sign between ISO 8855 and SAE J670
-TURNED = ("steering_wheel_angle", "ay", "az", "pitch_rate", "yaw_rate", "vy", "sideslip", "pitch")
+TURNED = (
+    "steering_wheel_angle",
+    "road_wheel_angle",
+    "ay",
+    "az",
+    "pitch_rate",
+    "yaw_rate",
+    "vy",
+    "sideslip",
+    "pitch",
+)
 
 _KEYS = (
-    "axes",
-    "rate",
-    "longest_gap",
-    "follow_speed",
-    "time",
-    "can",
-    "channels",
-    "truth",
-    "constants",
+    *("axes", "rate", "longest_gap", "follow_speed", "free_of_gravity"),
+    *("time", "can", "channels", "truth", "constants", "car"),
 )
 _CHANNEL_KEYS = ("name", "unit", "sign", "factor", "offset", "delay", "clock", "radius")
 _LARGEST = 1e9  # of factors, offsets and constants
@@ -103,6 +120,8 @@ class LogMap:
         channels: where inputs and measurements come from, by our names.
         truth: where truth comes from.
         constants: of inputs that the log has not [SI].
+        free_of_gravity: whether the accelerations are those of motion.
+        car: the table [car]; None if there is none.
     """
 
     path: Path
@@ -116,6 +135,8 @@ class LogMap:
     channels: dict[str, Source]
     truth: dict[str, Source]
     constants: dict[str, float]
+    free_of_gravity: bool = False
+    car: Table | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> "LogMap":
@@ -142,7 +163,7 @@ class LogMap:
         axes = table.choice("axes", "ISO", ("ISO", "SAE"))
         time = table.table("time")
         time.check_keys(("name", "unit"))
-        allowed = (*INPUTS, *MEASURABLE)
+        allowed = (*INPUTS, *MEASURABLE, *GIVES)
         log_map = cls(
             path=Path(table.path),
             axes=axes,
@@ -155,7 +176,11 @@ class LogMap:
             channels=_sources(table.table("channels"), allowed, axes),
             truth=_sources(table.table("truth"), MEASURABLE, axes),
             constants=_constants(table.table("constants")),
+            free_of_gravity=table.flag("free_of_gravity"),
+            car=table.table("car") if "car" in table else None,
         )
+        if log_map.car is not None:
+            CarSignals.of(log_map.car)
         _check_inputs(log_map)
         return log_map
 
@@ -276,6 +301,14 @@ def _constants(table: Table) -> dict[str, float]:
 def _check_inputs(log_map: LogMap) -> None:
     """Checks that each input is mapped or declared, once."""
     path, given = log_map.path, {**log_map.constants, **log_map.channels}
+    for signal in log_map.channels:
+        for name in GIVES.get(signal, ()):
+            if name in log_map.channels:
+                raise TwinError(
+                    f"{path}: channels.{name} is given beside channels.{signal}, which gives it; "
+                    "allowed: one of them"
+                )
+            given[name] = 0.0
     for name in log_map.constants:
         if name in log_map.channels:
             raise TwinError(f"{path}: constants.{name} is also in channels; allowed: one of them")

@@ -8,12 +8,13 @@ import numpy as np
 from twin.channels import FURTHER_OUTPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
 from twin.logs import can
+from twin.logs.car_signals import GIVES, CarSignals, derive
 from twin.logs.drive import Drive
 from twin.logs.formats import format_of
 from twin.logs.map import TORQUES, LogMap, Source, unit_in_si
 from twin.logs.raw_log import Array, Channel, RawLog, check_size, listed
 from twin.logs.resampling import FASTER, gaps, resample
-from twin.logs.units import our_unit
+from twin.logs.units import kind_of, our_unit
 
 _SPEED = "vx or the wheel speeds"
 _MOST_BETWEEN = 100_000  # samples of a drive between two of its log; chosen: one in 100 s
@@ -30,7 +31,7 @@ NEEDS = {
 }
 
 
-def load_drive(path: str | Path, map_path: str | Path) -> Drive:
+def load_drive(path: str | Path, map_path: str | Path, car: CarSignals | None = None) -> Drive:
     """A log as a drive.
 
     Inputs are those of `twin.INPUTS`, less the torques where the twin is to follow the speed.
@@ -42,6 +43,7 @@ def load_drive(path: str | Path, map_path: str | Path) -> Drive:
     Args:
         path: of any format of `twin.logs.formats`.
         map_path: see `twin.logs.map`.
+        car: what the car makes of its signals; the map's table [car] comes first.
 
     Raises:
         TwinError: the log or the map is missing or broken, they do not fit, or an input has gaps.
@@ -49,10 +51,10 @@ def load_drive(path: str | Path, map_path: str | Path) -> Drive:
     log_map = LogMap.load(map_path)
     reader = can if log_map.database else format_of(path)
     log = reader.read_log(Path(path), log_map.wanted)
-    return drive_of(log, log_map)
+    return drive_of(log, log_map, car)
 
 
-def drive_of(log: RawLog, log_map: LogMap) -> Drive:
+def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Drive:
     """The drive of a log that was read; see `load_drive`."""
     ours = {name: _in_si(log, log_map, name, s) for name, s in log_map.channels.items()}
     truth = {name: _in_si(log, log_map, name, s) for name, s in log_map.truth.items()}
@@ -70,6 +72,13 @@ def drive_of(log: RawLog, log_map: LogMap) -> Drive:
     for name, value in log_map.constants.items():
         columns[name] = np.full(grid.size, value)
         done.append(f"{name}: {value:g} {our_unit(name)} throughout, as the map declares.")
+    meant = car or CarSignals()
+    if log_map.car is not None:
+        meant = CarSignals.of(log_map.car, meant)
+    try:
+        done += derive(columns, 1.0 / log_map.rate, meant, log_map.free_of_gravity)
+    except TwinError as error:
+        raise TwinError(f"{log_map.path}: {error}") from None
     if log_map.follow_speed:
         done.append("The log has no torques: the twin is to follow the measured vx.")
     for name in log_map.input_names:
@@ -113,6 +122,8 @@ def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
         raise TwinError(f"{log.path}: channel {source.name[:40]!r}, mapped to {name}, {has}")
     channel = log.channels[source.name]
     unit = source.unit or channel.unit
+    if kind_of(name) == "number":
+        unit = "1"
     if not unit:
         raise TwinError(
             f"{log_map.path}: channels.{name}.unit is missing and {log.path} gives none; allowed: "
@@ -131,7 +142,11 @@ def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
 
 def _grid(log: RawLog, log_map: LogMap, ours: Mapping[str, Channel]) -> Array:
     """Sample times over which there are all inputs, or anything at all if all are declared."""
-    inputs = [channel.time for name, channel in ours.items() if name in log_map.input_names]
+    inputs = [
+        channel.time
+        for name, channel in ours.items()
+        if name in log_map.input_names or set(GIVES.get(name, ())) & set(log_map.input_names)
+    ]
     times = inputs or [channel.time for channel in ours.values()]
     if not times:
         raise TwinError(f"{log_map.path}: channels is empty; allowed: map at least one")

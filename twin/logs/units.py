@@ -43,6 +43,8 @@ UNITS = {
         "lbf ft": 1.3558179483,
     },
     "pressure": {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0, "psi": 0.0689475729},
+    "slope": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "%": 0.01},
+    "number": {"1": 1.0},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254},
     "ratio": {"1": 1.0, "%": 0.01},
     "time": {
@@ -117,6 +119,13 @@ _KINDS = {
     **dict.fromkeys(("sideslip", "roll", "pitch"), "angle"),
     "suspension_travel": "length",
     "accelerator_pedal": "ratio",
+    # signals of cars, see `twin.logs.car_signals`
+    "speed": "speed",
+    **dict.fromkeys(("motor_torque", "motor_torque_front", "motor_torque_rear"), "torque"),
+    **dict.fromkeys(("brake_pressure", "brake_pressure_front", "brake_pressure_rear"), "pressure"),
+    **dict.fromkeys(("road_wheel_angle", "course"), "angle"),
+    **dict.fromkeys(("slope", "bank"), "slope"),
+    "gear": "number",
 }
 
 CHANNELS = (*INPUTS, *OUTPUTS, *FURTHER_OUTPUTS)
@@ -177,11 +186,12 @@ def _spellings() -> dict[str, dict[str, str]]:
     """Plain spelling to unit, by kind; one that two units share stands for neither."""
     found: dict[str, dict[str, str]] = {}
     for kind, units in UNITS.items():
+        words_of_kind = _ALIASES.get("angle" if kind == "slope" else kind, {})
         plain: dict[str, str] = {}
         for unit in units:
             # "mg" and "Mg", "ms" and "Ms": the case of a metric prefix is not looked at
             plain.setdefault(_plain(unit), unit)
-        for unit, words in _ALIASES.get(kind, {}).items():
+        for unit, words in words_of_kind.items():
             for word in words.split():
                 plain.setdefault(_plain(word), unit)
         found[kind] = plain
