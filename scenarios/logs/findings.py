@@ -35,6 +35,7 @@ _BRAKES = (0.7, 1.5)  # of the brakes' scale over the drive torques'
 _SLOWEST_RATE = 1.0  # [Hz] of a log
 _FASTEST_RATE = 20_000.0
 _LONGEST = 24.0 * 3600.0  # [s]
+_SMOOTH = 4.0  # [s] over which hills are told from bumps
 _SLOPE = 0.25  # [m/s2] that the torques see of hills and the accelerations do not
 
 
@@ -82,6 +83,27 @@ def findings(drive: Drive, vehicle: Vehicle | None = None) -> list[Finding]:
             known = any("ax" in finding.channels for finding in found)
             found += [*_of_forces(signals, car, checked, known), *_axles(signals, car)]
     return found
+
+
+def hills(drive: Drive, vehicle: Vehicle) -> float:
+    """How hilly a drive is: what gravity adds to a_x, as a standard deviation [m/s2]; 0 if unseen.
+
+    Raises:
+        TwinError: as `findings`.
+    """
+    car = facts_of(vehicle)
+    signals = signals_of(_middle(drive), car)
+    if not signals.has("ax", "speed"):
+        return 0.0
+    good = signals.where("ax", "speed")
+    if good.sum() * signals.dt < 4.0 * _SMOOTH:
+        return 0.0
+    rate = signals.rate("speed")
+    a, b = signals.known["ax"][good], rate[good]
+    # the body pitches: ax is some percent more than the change of speed
+    pitching = float(a @ b / max(float(b @ b), 1e-9))
+    rest = signals.known["ax"] - min(max(pitching, 1.0), 1.1) * rate
+    return float(uniform_filter1d(rest, round(_SMOOTH / signals.dt))[good].std())
 
 
 def _middle(drive: Drive) -> Drive:
@@ -231,7 +253,7 @@ def _of_forces(
             words=f"The brake torques are {ratio:.2g} times what the drive torques let expect",
             mend=f"[channels.brake_torque_*] factor = {1.0 / ratio:.2g}",
         )
-    slow = round(4.0 / signals.dt)
+    slow = round(_SMOOTH / signals.dt)
     by_torques = force / (mass * check.fit.slope) - ax
     by_speed = ax - signals.rate("speed")
     smooth = [uniform_filter1d(values, slow)[good].std() for values in (by_torques, by_speed)]
