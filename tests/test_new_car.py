@@ -13,7 +13,12 @@ from twin.tyre.size import parse_size, tyre_text
 from twin.tyre.tir import read_tyre
 
 GOLF = Figures(
-    mass=1400.0, wheelbase=2.65, track=1.53, front_share=0.6, tyre=parse_size("205/55R16 91V")
+    mass=1400.0,
+    wheelbase=2.65,
+    track=1.53,
+    front_share=0.6,
+    drive_front=1.0,
+    tyre=parse_size("205/55R16 91V"),
 )
 
 
@@ -63,11 +68,16 @@ def test_car_of_a_few_figures_weighs_and_stands_as_they_say(golf):
     assert states[2] == pytest.approx(read_car(golf)["imu"]["height"], abs=2e-3)
 
 
+def test_driven_axle_is_the_one_that_was_named(golf):
+    assert Vehicle.load(golf).figures.drive_front == 1.0
+
+
 def test_figures_are_known_and_rules_are_guesses(golf):
     guesses, total = car_guesses(golf)
     names = {guess.name for guess in guesses}
     known = {"chassis.mass", "chassis.cm_to_front_axle", "geometry.wheelbase"}
-    assert len(guesses) == total - len(known | {"geometry.track_front", "geometry.track_rear"})
+    known |= {"geometry.track_front", "geometry.track_rear", "drivetrain.drive_front"}
+    assert len(guesses) == total - len(known)
     assert names.isdisjoint(known)
     assert {"chassis.Jzz", "suspension.front.stiffness", "steering.ratio"} <= names
     assert all(guess.sd > 0.0 for guess in guesses if guess.value != 0.0)

@@ -11,6 +11,10 @@ _load_index = click.option(
 )
 
 
+# Share of the drive torque on the front axle, by what is driven
+_DRIVEN = {"front": 1.0, "rear": 0.0, "all": 0.4}
+
+
 def _figure(name: str, unit: str, text: str):
     return click.option(f"--{name}", type=float, metavar=unit, help=text)
 
@@ -21,6 +25,7 @@ def _figure(name: str, unit: str, text: str):
 @_figure("wheelbase", "M", "Distance of the axles.")
 @_figure("track", "M", "Distance of left and right wheels, mean of both axles.")
 @_figure("front-share", "X", "Of the weight, on the front axle, as 0.6.")
+@click.option("--driven", type=click.Choice(sorted(_DRIVEN)), help="Axle; all: 40 % in front.")
 @click.option("--tyre", metavar="SIZE", help="As '205/55R16 91V'; writes NAME.tir, too.")
 @_load_index
 def new_car(
@@ -29,6 +34,7 @@ def new_car(
     wheelbase: float | None,
     track: float | None,
     front_share: float | None,
+    driven: str | None,
     tyre: str | None,
     load_index: int | None,
 ) -> None:
@@ -43,6 +49,7 @@ def new_car(
         "wheelbase": wheelbase,
         "track": track,
         "front_share": front_share,
+        "drive_front": _DRIVEN.get(driven or ""),
     }
     given = {key: value for key, value in figures.items() if value is not None}
     path = catalogue.new_car().new_car(name, given, tyre, load_index)

@@ -13,12 +13,12 @@ ABSOLUTE = {
     **{"to_front_axle": 0.30, "height": 0.15, "wheelbase": 0.05, "wheel_centre_height": 0.01},
     **{"track_front": 0.04, "track_rear": 0.04, "roll_centre_height": 0.04, "travel_slope": 0.03},
     **{"Jxy": 5.0, "Jxz": 40.0, "Jyz": 5.0, "ackermann": 0.3, "free_travel": 0.02},
-    **{"lift_area_front": 0.1, "lift_area_rear": 0.1},
+    **{"lift_area_front": 0.1, "lift_area_rear": 0.1, "drive_front": 0.4, "brake_front": 0.06},
 }
 RELATIVE = {
     **{"mass": 0.10, "Jxx": 0.15, "Jyy": 0.12, "Jzz": 0.10, "ratio": 0.10, "drag_area": 0.15},
     **{"stiffness": 0.25, "damping": 0.35, "anti_roll": 0.5, "bump_stop": 0.5},
-    **{"hub_mass": 0.25, "wheel_mass": 0.15, "wheel_inertia": 0.25},
+    **{"hub_mass": 0.25, "wheel_mass": 0.15, "wheel_inertia": 0.25, "power": 0.3},
 }
 
 

@@ -20,6 +20,7 @@ LIMITS = {
     "wheelbase": (1.2, 8.0),
     "track": (0.8, 3.0),
     "front_share": (0.25, 0.75),
+    "drive_front": (0.0, 1.0),
 }
 
 Values = dict[tuple[str, str], float]
@@ -34,6 +35,7 @@ class Figures:
         wheelbase: [m].
         track: mean of both axles [m].
         front_share: of the weight, on the front axle.
+        drive_front: of the drive torque, on the front axle.
         tyre: of both axles; None: that of the project's SUV.
         known: the names above that somebody gave; the others are guesses.
 
@@ -45,8 +47,9 @@ class Figures:
     wheelbase: float = 2.9
     track: float = 1.65
     front_share: float = 0.567
+    drive_front: float = 0.4
     tyre: TyreSize | None = None
-    known: frozenset[str] = frozenset(("mass", "wheelbase", "track", "front_share"))
+    known: frozenset[str] = frozenset(("mass", "wheelbase", "track", "front_share", "drive_front"))
 
     def __post_init__(self) -> None:
         for name, (least, largest) in LIMITS.items():
@@ -65,6 +68,7 @@ _SETTLES = {
     ("geometry", "wheelbase"): ("wheelbase",),
     ("geometry", "track_front"): ("track",),
     ("geometry", "track_rear"): ("track",),
+    ("drivetrain", "drive_front"): ("drive_front",),
 }
 
 
@@ -97,6 +101,7 @@ def derived(figures: Figures) -> Values:
         **{("chassis", name): 0.0 for name in ("Jxy", "Jxz", "Jyz")},
         ("imu", "to_front_axle"): behind,
         ("imu", "height"): height,
+        ("drivetrain", "drive_front"): figures.drive_front,
         ("geometry", "wheelbase"): figures.wheelbase,
         ("geometry", "track_front"): figures.track,
         ("geometry", "track_rear"): figures.track,
