@@ -65,3 +65,13 @@ def test_stamp_ignores_what_the_package_offers_besides(project):
     before = stamp(project / "room/caller.py", project)
     (project / "room/other.py").write_text("unused = 2\n")
     assert stamp(project / "room/caller.py", project) == before
+
+
+def test_cache_of_an_older_source_is_removed_unread(project):
+    _result(project)
+    (index,) = (project / "room/__pycache__").glob("caller.caller-*.nbi")
+    index.write_bytes(b"no pickle of any version")
+    caller = project / "room/caller.py"
+    caller.write_text(caller.read_text().replace("+ 1", "+ 2"))
+    assert _result(project) == ["3", "0"]
+    assert not index.exists()

@@ -5,6 +5,7 @@ running as before. Here the key is a hash of the file and of all files of the pr
 imports, directly or not.
 """
 
+import glob
 import hashlib
 import re
 from collections.abc import Iterator
@@ -29,11 +30,29 @@ class SourceTreeLocator(caching.InTreeCacheLocator):  # pyright: ignore[reportAt
         """A hash of all sources that decide the machine code."""
         return stamp(Path(self._py_file), ROOT)
 
+    def get_disambiguator(self) -> str:
+        """A part of the files' names: numba unpickles an index before it compares its stamp.
+
+        That of an older source may name classes that are no more.
+        """
+        return f"{super().get_disambiguator()}-{self.get_source_stamp().hex()[:16]}"
+
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> Any:
         """Leaves files of other projects to numba's own locators."""
         inside = Path(py_file).is_relative_to(ROOT) and (ROOT / py_file).suffix == ".py"
-        return super().from_function(py_func, py_file) if inside else None
+        found = super().from_function(py_func, py_file) if inside else None
+        if found is not None:
+            found.prune(f"{Path(py_file).stem}.{py_func.__qualname__}-")
+        return found
+
+    def prune(self, start: str) -> None:
+        """Removes what is cached of older sources of a function."""
+        start = re.sub("[<>]", "", start)
+        current = f"{start}{self.get_disambiguator()}."
+        for file in Path(self.get_cache_path()).glob(f"{glob.escape(start)}*.nb[ic]"):
+            if not file.name.startswith(current):
+                file.unlink(missing_ok=True)
 
 
 def install() -> None:
