@@ -6,25 +6,27 @@ last third each has steering, speed, accelerations and yaw rate alone.
 `models/ferrari_250lm.toml` is the calibration that ships; `til tune ferrari` makes it anew.
 """
 
-import math
 import sys
-import time
-from collections.abc import Callable
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import models
+from estimators.base import Estimate, sideslip_estimate
 from estimators.benchmarks import single_track, static_map
+from estimators.entry import Given
 from estimators.speed_follower import SpeedFollower
 from scenarios.calibration import calibrate
 from scenarios.calibration.calibrate import cut
 from scenarios.calibration.candidate import Candidate
 from scenarios.calibration.ferrari_log import PARTS, data_file, load, part
-from scenarios.cli.catalogue import Scenario, Settings, Tuning
-from scenarios.experiment.result import Result, Row
+from scenarios.experiment.experiment import Case, Experiment, Recipe, Run, Score, Trial
+from scenarios.experiment.metrics import rms
+from scenarios.experiment.result import Result
 from scenarios.report.pictures import figure
 from twin import Drive, TwinError, Vehicle
 
@@ -64,14 +66,43 @@ def calibrated() -> Candidate:
     return replace(nominal(), values=calibrate.read(models.path(CALIBRATION)))
 
 
-def twin_sideslip(drive: Drive) -> Array:
-    """(N,) of the calibrated twin [rad]."""
+@dataclass(frozen=True)
+class _WholeDrive:
+    """An estimator that is a function of a whole drive: it has no state to reset."""
+
+    of: Callable[[Drive], Estimate]
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """See `estimators.base.Estimator`."""
+
+    def run(self, drive: Drive) -> Estimate:
+        """See `estimators.base.Estimator`."""
+        return self.of(drive)
+
+
+def _calibrated(drive: Drive) -> Estimate:
+    """The calibrated twin's, with the sideslip of the point where it is measured."""
     candidate = calibrated()
-    return candidate.sideslip(candidate.run(drive))
+    found = candidate.run(drive)
+    return replace(
+        found,
+        outputs=np.column_stack([found.outputs, candidate.sideslip(found)]),
+        output_names=(*found.output_names, "sideslip"),
+    )
 
 
-def single_track_sideslip(drive: Drive) -> Array:
-    """(N,) of a single-track car fitted to the first two thirds [rad]."""
+def _zero(drive: Drive) -> Estimate:
+    """No sideslip at all: what every estimator has to beat."""
+    return sideslip_estimate(drive.time, np.zeros(len(drive)))
+
+
+def _single_track(run: Run, drive: Drive, given: Given) -> Given:
+    """Fitted to the first two thirds."""
     steering, speed = drive.channel("steering_wheel_angle"), drive.channel("vx")
     known = part(drive, CALIBRATED_ON)
     fitted = single_track.fit(
@@ -81,67 +112,66 @@ def single_track_sideslip(drive: Drive) -> Array:
         speed[known],
         drive.truth["sideslip"][known],
     )
-    return single_track.predict(fitted, GEOMETRY, steering, drive, speed)
+    return replace(given, model=(fitted, GEOMETRY))
 
 
-def static_map_sideslip(drive: Drive) -> Array:
-    """(N,) of a static map fitted to the first two thirds, signals low-passed at 2 Hz [rad]."""
+def _static_map(run: Run, drive: Drive, given: Given) -> Given:
+    """Fitted to the first two thirds, signals low-passed at 2 Hz."""
     known = part(drive, CALIBRATED_ON)
-    ay, yaw_rate, speed = (
-        static_map.low_pass(drive.channel(name), drive.dt) for name in ("ay", "yaw_rate", "vx")
-    )
-    fitted = static_map.fit(
-        ay[known], yaw_rate[known], speed[known], drive.truth["sideslip"][known]
-    )
-    return static_map.predict(fitted, ay, yaw_rate, speed)
+    ay, yaw_rate, speed = (values[known] for values in static_map.map_inputs(drive))
+    fitted = static_map.fit(ay, yaw_rate, speed, drive.truth["sideslip"][known])
+    return replace(given, model=fitted)
 
 
-# A double-track observer will be one more line.
-ESTIMATORS: dict[str, Callable[[Drive], Array]] = {
-    "til": twin_sideslip,
-    "single-track": single_track_sideslip,
-    "static-map": static_map_sideslip,
-    "zero": lambda drive: np.zeros(len(drive)),
+RECIPES = {
+    "til": Recipe(estimator="til", make=lambda run, drive: _WholeDrive(_calibrated)),
+    "single-track": Recipe(estimator="single-track", complete=_single_track),
+    "static-map": Recipe(estimator="static-map", complete=_static_map),
+    "zero": Recipe(estimator="zero", make=lambda run, drive: _WholeDrive(_zero)),
 }
 
 
-def rmse_deg(estimate: Array, truth: Array) -> float:
-    """Root mean square error [deg] of angles [rad]."""
-    return float(np.degrees(np.sqrt(np.mean((estimate - truth) ** 2))))
+@dataclass(frozen=True)
+class Log:
+    """The log as a plant: no seed changes it."""
+
+    def drive(self, case: Case, rng: np.random.Generator, duration: float | None) -> Drive:
+        """The whole log.
+
+        Raises:
+            TwinError: it is to be shorter, or it is not there.
+        """
+        if duration is not None:
+            raise TwinError("ferrari: takes no duration; its parts are shares of the whole log")
+        return _log(data_file())
+
+    def vehicle(self) -> Vehicle:
+        """What is drawn."""
+        return calibrated().vehicle
 
 
-def run(settings: Settings) -> Result:
-    """Scores all estimators on both parts of the log."""
-    start = time.perf_counter()
-    drive = _drive(settings)
-    sideslip = {name: estimator(drive) for name, estimator in ESTIMATORS.items()}
-    rows = [
-        Row.over_seeds(
-            [rmse_deg(sideslip[name][samples], drive.truth["sideslip"][samples])],
-            case=case,
-            quantity="sideslip",
-            metric="rmse",
-            unit="deg",
-            estimator=name,
-        )
-        for case, samples in ((case, part(drive, case)) for case in reversed(PARTS))
-        for name in ESTIMATORS
+@cache
+def _log(file: Path) -> Drive:
+    return load(file)
+
+
+def errors(trial: Trial) -> list[Score]:
+    """Rms error of the sideslip [deg] on both parts of the log."""
+    error = np.degrees(trial.estimate.sideslip - trial.drive.truth["sideslip"])
+    return [
+        Score("sideslip", "rmse", "deg", rms(error[part(trial.drive, name)]), case=name)
+        for name in reversed(PARTS)
     ]
-    return Result(
-        name="ferrari", settings=asdict(settings), seconds=time.perf_counter() - start, rows=rows
-    )
 
 
-def tune(tuning: Tuning) -> Result:
+def tune(estimator: str, path: Path, *, jobs: int, evaluations: int) -> Result:
     """Calibrates the twin on the first two thirds of the log.
 
     Raises:
-        TwinError: another estimator is asked for, bounds or a cost are, or the log is not there.
+        TwinError: another estimator is asked for, or the log is not there.
     """
-    if tuning.estimator != "til":
-        raise TwinError(f"tune: estimator is {tuning.estimator!r}; allowed: til")
-    if tuning.bounds or tuning.cost:
-        raise TwinError("tune: ferrari takes no --bounds and no --cost; allowed: neither")
+    if estimator != "til":
+        raise TwinError(f"tune: estimator is {estimator!r}; allowed: til")
     file = data_file()
     drive = load(file)
     task = calibrate.Task(
@@ -151,23 +181,19 @@ def tune(tuning: Tuning) -> Result:
         signals=SIGNALS,
         drive=cut(drive, part(drive, CALIBRATED_ON)),
     )
-    return calibrate.run(task, file, tuning.path, jobs=tuning.jobs, evaluations=tuning.evaluations)
+    return calibrate.run(task, file, path, jobs=jobs, evaluations=evaluations)
 
 
-def _drive(settings: Settings) -> Drive:
-    if not math.isnan(settings.snr):
-        raise TwinError(f"ferrari: snr is {settings.snr:g}; the log is measured: it takes none")
-    if settings.duration is not None:
-        raise TwinError("ferrari: takes no duration; its parts are shares of the whole log")
-    return load(data_file())
-
-
-def picture(settings: Settings, path: Path) -> None:
+def picture(trials: Sequence[Trial], path: Path) -> None:
     """Sideslip and its errors over the last third, and where on the track the twin's error sits."""
-    drive = _drive(settings)
+    drive = trials[0].drive
     samples = part(drive, SCORED_ON)
     time, truth = drive.time[samples], drive.truth["sideslip"][samples]
-    sideslip = {name: one(drive)[samples] for name, one in ESTIMATORS.items() if name != "zero"}
+    sideslip = {
+        trial.run.estimator: trial.estimate.sideslip[samples]
+        for trial in trials
+        if trial.run.estimator != "zero"
+    }
     with figure(path, title="Ferrari 250 LM, last third of the log", rows=3, shared=False) as axes:
         above, middle, below = axes
         above.plot(time, np.degrees(truth), "k", lw=1.0, label="measured")
@@ -194,23 +220,16 @@ def _track(drive: Drive, samples: slice) -> tuple[Array, Array]:
     return np.cumsum(step * np.cos(course)), np.cumsum(step * np.sin(course))
 
 
-def timeline(settings: Settings, path: Path) -> None:
-    """The calibrated twin over the log as a Rerun recording."""
-    from scenarios.timeline.timeline import write_timeline
-
-    drive, candidate = _drive(settings), calibrated()
-    estimate = candidate.run(drive)
-    write_timeline(
-        path,
-        vehicle=candidate.vehicle,
-        drive=drive.replace(truth={}),
-        estimate=estimate,
-        parameters=(),
-        title="ferrari",
-    )
-
-
-SCENARIO = Scenario(run=run, timeline=timeline, tune=tune, picture=picture, vehicle=VEHICLE)
+EXPERIMENT = Experiment(
+    name="ferrari",
+    cases=(Case(name="log", plant=Log(), measured=True),),
+    estimators=RECIPES,
+    quantities=("sideslip",),
+    metrics=errors,
+    timeline="parameters",
+    picture=picture,
+    calibrate=tune,
+)
 
 
 if __name__ == "__main__":

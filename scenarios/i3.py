@@ -6,12 +6,10 @@ shipped. The owners' list notes a load on two of the trips here, beyond the usua
 are held out: nothing was chosen by them. All others count as the driver alone.
 """
 
-import math
 import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +19,7 @@ from estimators.weigh.calibration import Calibration, Reference
 from estimators.weigh.samples import samples_of
 from estimators.weigh.trip import Trip
 from estimators.weigh.weighing import weigh
-from scenarios.cli.catalogue import Scenario, Settings
+from scenarios.experiment.experiment import Experiment, Study
 from scenarios.experiment.result import Result, Row
 from scenarios.weighing.car import Car, car_of
 from scenarios.weighing.logs import read_trips
@@ -80,18 +78,19 @@ def load_trips(jobs: int = 1) -> tuple[Car, list[Trip], list[Trip]]:
     return car, references, [trip for trip in trips if trip.name in HELD_OUT]
 
 
-def run(settings: Settings) -> Result:
+def run(seeds: Sequence[int], jobs: int, duration: float | None) -> Result:
     """Weighs every trip by all others, with the baseline and the twin's own answer beside it."""
     start = time.perf_counter()
-    _check(settings)
-    car, trips, held_out = load_trips(settings.jobs)
-    weighings, calibrations = cross_validated(car, trips, settings.jobs)
+    if duration is not None:
+        raise TwinError("i3: takes no duration; the trips are weighed whole")
+    car, trips, held_out = load_trips(jobs)
+    weighings, calibrations = cross_validated(car, trips, jobs)
     calibration = _all(car, trips)
     new = [weigh(trip, calibration) for trip in held_out]
     found = {
         "weigh": as_scored([*weighings, *new]),
         "regression": by_regression(car, trips, held_out),
-        "til": by_twin(Vehicle.load(VEHICLE), car, trips, held_out, calibration, settings.jobs),
+        "til": by_twin(Vehicle.load(VEHICLE), car, trips, held_out, calibration, jobs),
     }
     heavy = _unnoted(trips, calibration)
     rows = [row for name, scored in found.items() for row in _rows(name, scored, trips, heavy)]
@@ -104,7 +103,7 @@ def run(settings: Settings) -> Result:
     ]
     return Result(
         name="i3",
-        settings=asdict(settings) | {"report": report},
+        settings={"seeds": list(seeds), "jobs": jobs, "duration": duration} | {"notes": report},
         seconds=time.perf_counter() - start,
         rows=rows,
     )
@@ -166,18 +165,10 @@ def _row(estimator: str, case: str, metric: str, unit: str, values: Sequence[flo
     )
 
 
-def _check(settings: Settings) -> None:
-    if not math.isnan(settings.snr):
-        raise TwinError(f"i3: snr is {settings.snr:g}; the trips are measured: they take none")
-    if settings.duration is not None:
-        raise TwinError("i3: takes no duration; the trips are weighed whole")
-
-
-def picture(settings: Settings, path: Path) -> None:
+def picture(path: Path, jobs: int) -> None:
     """Load and interval of every trip, each weighed by the others."""
-    _check(settings)
-    car, trips, held_out = load_trips(settings.jobs)
-    weighings, _ = cross_validated(car, trips, settings.jobs)
+    car, trips, held_out = load_trips(jobs)
+    weighings, _ = cross_validated(car, trips, jobs)
     calibration = _all(car, trips)
     everyone = [*weighings, *(weigh(trip, calibration) for trip in held_out)]
     notes = {name: f"noted: {load:+.0f} kg" for name, load in HELD_OUT.items()}
@@ -189,16 +180,7 @@ def picture(settings: Settings, path: Path) -> None:
     )
 
 
-def timeline(settings: Settings, path: Path) -> None:
-    """There is none.
-
-    Raises:
-        TwinError: always.
-    """
-    raise TwinError(f"{path}: i3 has no timeline; allowed: --png")
-
-
-SCENARIO = Scenario(run=run, timeline=timeline, picture=picture, vehicle=VEHICLE)
+EXPERIMENT = Experiment(name="i3", quantities=("load",), study=Study(run, picture))
 
 
 if __name__ == "__main__":

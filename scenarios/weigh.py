@@ -4,13 +4,10 @@ The logs are those of a real car's bus: 10 Hz, a quantised speed, torques of unk
 losses, brakes, slope and wind unknown. The car is calibrated from trips of its own without load.
 """
 
-import math
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -18,13 +15,13 @@ from estimators.weigh.calibration import Calibration, Reference
 from estimators.weigh.samples import samples_of
 from estimators.weigh.trip import Trip
 from estimators.weigh.weighing import weigh
-from scenarios.cli.catalogue import Scenario, Settings
+from scenarios.experiment.experiment import Experiment, Study
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Result, Row
 from scenarios.weighing.car import car_of
 from scenarios.weighing.simulated import simulated_trip
 from scenarios.weighing.study import everything, regression_of
-from twin import TwinError, Vehicle
+from twin import Vehicle
 
 VEHICLE = "bmw_i3"
 LOADS = (0.0, 75.0, 150.0, 225.0, 300.0)  # [kg], one after the other over the seeds
@@ -33,17 +30,15 @@ FIRST_REFERENCE = 100_000  # seeds of the reference trips, beyond any of the use
 MINUTES = 12.0  # of every trip
 
 
-def run(settings: Settings) -> Result:
+def run(seeds: Sequence[int], jobs: int, duration: float | None) -> Result:
     """Weighs one trip for each seed."""
-    if not math.isnan(settings.snr):
-        raise TwinError(f"weigh: snr is {settings.snr:g}; the log's sensors have their own noise")
     start = time.perf_counter()
-    minutes = MINUTES if settings.duration is None else settings.duration / 60.0
+    minutes = MINUTES if duration is None else duration / 60.0
     vehicle = Vehicle.load(VEHICLE)
     car = car_of(vehicle)
     tasks = [(0.0, FIRST_REFERENCE + k) for k in range(REFERENCES)]
-    tasks += [(LOADS[seed % len(LOADS)], seed) for seed in settings.seeds]
-    trips = parallel(partial(_trip, vehicle, minutes), tasks, settings.jobs, "trips")
+    tasks += [(LOADS[seed % len(LOADS)], seed) for seed in seeds]
+    trips = parallel(partial(_trip, vehicle, minutes), tasks, jobs, "trips")
     known, new = trips[:REFERENCES], trips[REFERENCES:]
     loads = [load for load, _ in tasks[REFERENCES:]]
     calibration = everything(car, [Reference(name=t.name, samples=samples_of(t)) for t in known])
@@ -57,7 +52,7 @@ def run(settings: Settings) -> Result:
     ]
     return Result(
         name="weigh",
-        settings=asdict(settings),
+        settings={"seeds": list(seeds), "jobs": jobs, "duration": duration},
         seconds=time.perf_counter() - start,
         rows=rows,
     )
@@ -92,16 +87,7 @@ def _rows(
     ]
 
 
-def timeline(settings: Settings, path: Path) -> None:
-    """There is none.
-
-    Raises:
-        TwinError: always.
-    """
-    raise TwinError(f"{path}: weigh has no timeline; allowed: none")
-
-
-SCENARIO = Scenario(run=run, timeline=timeline, vehicle=VEHICLE)
+EXPERIMENT = Experiment(name="weigh", quantities=("load",), study=Study(run))
 
 
 if __name__ == "__main__":

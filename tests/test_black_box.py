@@ -92,7 +92,7 @@ def test_a_twin_behind_the_python_path_gives_the_compiled_estimate_to_the_bit():
     twins = [Twin(Vehicle.load("suv")) for _ in range(2)]
     found = []
     for box in (twins[0], Borrowed(twins[1])):
-        observer = Observer(box, mass.STUDY.laws["til"], gains)
+        observer = Observer(box, mass.EXPERIMENT.estimators["til"].laws, gains)
         observer.reset(0.0, {"cm_x": -0.02})
         found.append(observer.run(drive))
     compiled, through_python = found

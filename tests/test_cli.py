@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -7,13 +8,17 @@ import time
 from importlib import metadata
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from estimators.base import sideslip_estimate
 from scenarios import __main__ as cli
 from scenarios.cli import catalogue
-from scenarios.cli.catalogue import REPRODUCTIONS, SCENARIOS, Entry, Scenario
+from scenarios.cli.catalogue import REPRODUCTIONS, SCENARIOS, Entry
+from scenarios.experiment.experiment import Case, Experiment, Recipe, Score
 from scenarios.experiment.result import Result, Row
-from twin import TwinError
+from scenarios.timeline import write
+from twin import Drive, TwinError
 
 ROOT = Path(__file__).parents[1]
 
@@ -30,38 +35,67 @@ def make_result(name, settings, seeds, case="same"):
     return Result(name=name, settings=settings, seconds=0.5, rows=[row])
 
 
-def run_fake(settings):
-    if settings.duration == 13.0:
-        raise TwinError("suv.xml: mass is -1 kg,\nmust be positive")
-    if settings.duration == 14.0:
-        raise KeyboardInterrupt
-    if settings.duration == 15.0:
-        raise ZeroDivisionError
-    kept = {"snr": settings.snr, "jobs": settings.jobs, "duration": settings.duration}
-    return make_result("fake", kept, settings.seeds, case=f"{settings.snr:g}dB")
+class FakePlant:
+    """A drive of two samples; some durations are mistakes and bugs."""
+
+    def drive(self, case, rng, duration):
+        if duration == 13.0:
+            raise TwinError("suv.xml: mass is -1 kg,\nmust be positive")
+        if duration == 14.0:
+            raise KeyboardInterrupt
+        if duration == 15.0:
+            raise ZeroDivisionError
+        return Drive(
+            time=np.arange(2) * 0.1,
+            inputs=np.empty((2, 0)),
+            input_names=(),
+            measurements=np.empty((2, 0)),
+            output_names=(),
+            truth={},
+            settings={},
+        )
 
 
-def draw_fake(settings, path):
-    path.write_text(f"timeline of seed {settings.seeds[0]}")
+class FakeEstimator:
+    def reset(self, *_):
+        """It has no state."""
+
+    def run(self, drive):
+        return sideslip_estimate(drive.time, np.zeros(len(drive)))
 
 
-def reproduce_fake(seeds, jobs, out):
-    (out / "fake.png").write_text("picture")
-    return make_result("fake-table-1", {"jobs": jobs}, range(seeds))
+def score_fake(trial):
+    run = trial.run
+    return [Score("mass", "rms_pct", "%", float(run.seed), case=f"{run.case.snr:g}dB")]
 
 
-def limit_fake(name, scenario, settings):
-    kept = {"snr": settings.snr, "duration": settings.duration}
-    return make_result(f"limits of {name}", kept, [1]), f"bounds at {settings.snr:g} dB"
+def reproduce_fake(making):
+    (making.out / "fake.png").write_text("picture")
+    settings = {"jobs": making.jobs, "duration": making.duration}
+    return make_result("fake-table-1", settings, making.seeds)
 
 
-FAKE = Scenario(
-    run=run_fake,
-    timeline=draw_fake,
-    default_snr=10.0,
-    vehicle="suv",
-    drive=lambda settings: None,
-    variation=dict,
+def bench_fake():
+    return make_result("bench", {}, [0])
+
+
+def draw_fake(trials, path):
+    path.write_text(f"timeline of seed {trials[0].run.seed}")
+
+
+def limit_fake(experiment, snr, duration):
+    case = experiment.at(snr)[0]
+    kept = {"snr": case.snr, "duration": duration}
+    result = make_result(f"limits of {experiment.name}", kept, [1])
+    return result, f"bounds at {case.snr:g} dB"
+
+
+FAKE = Experiment(
+    name="fake",
+    cases=(Case(name="fake", plant=FakePlant(), snr=10.0),),
+    estimators={"til": Recipe(estimator="til", make=lambda run, drive: FakeEstimator())},
+    quantities=("mass",),
+    metrics=score_fake,
 )
 
 
@@ -109,7 +143,7 @@ def test_run_prints_a_table_and_writes_nothing(til, tmp_path):
     status, out, err = til("run", "fake", "--seeds", "3")
     assert (status, err) == (0, "")
     title, heading, _, row = out.splitlines()
-    assert title == "fake (0.5 s)"
+    assert re.fullmatch(r"fake \(\d+\.\d s\)", title)
     assert heading.split()[-2:] == ["median", "p90"]
     assert row.split() == ["10dB", "mass", "rms_pct", "%", "til", "3", "1.00", "1.80"]
     assert list(tmp_path.iterdir()) == []
@@ -118,14 +152,14 @@ def test_run_prints_a_table_and_writes_nothing(til, tmp_path):
 def test_run_without_options_is_one_seed_at_the_scenario_s_noise(til):
     data = run_json(til, "run", "fake")
     assert list(data) == ["name", "settings", "versions", "seconds", "rows"]
-    assert data["settings"] == {"snr": 10.0, "jobs": 1, "duration": None}
+    assert data["settings"] == {"snr": 10.0, "seeds": [0], "jobs": 1, "duration": None}
     assert (data["rows"][0]["seeds"], data["rows"][0]["median"]) == (1, 0.0)
 
 
 def test_options_of_run_reach_the_scenario(til):
-    options = "run fake --snr 5 --seed 7 --seeds 3 --jobs 4 --duration 2.5"
+    options = "run fake --snr 5 --seed 7 --seeds 3 --jobs 2 --duration 2.5"
     data = run_json(til, *options.split())
-    assert data["settings"] == {"snr": 5.0, "jobs": 4, "duration": 2.5}
+    assert data["settings"] == {"snr": 5.0, "seeds": [7, 8, 9], "jobs": 2, "duration": 2.5}
     assert (data["rows"][0]["seeds"], data["rows"][0]["median"]) == (3, 8.0)
 
 
@@ -136,16 +170,23 @@ def test_infinite_signal_to_noise_ratio_is_taken(til):
 def test_json_file_comes_beside_the_table(til, tmp_path):
     status, out, _ = til("run", "fake", "--json", "fake.json")
     assert status == 0
-    assert out.startswith("fake (0.5 s)\n")
+    assert out.startswith("fake (")
     assert json.loads((tmp_path / "fake.json").read_text())["name"] == "fake"
 
 
+@pytest.fixture
+def _timeline(monkeypatch):
+    monkeypatch.setitem(write.KINDS, "parameters", draw_fake)
+
+
+@pytest.mark.usefixtures("_timeline")
 def test_rrd_file_holds_the_timeline_of_the_first_seed(til, tmp_path):
     assert til("run", "fake", "--seed", "7", "--rrd", "fake.rrd")[0] == 0
     assert [path.name for path in tmp_path.iterdir()] == ["fake.rrd"]
     assert (tmp_path / "fake.rrd").read_text() == "timeline of seed 7"
 
 
+@pytest.mark.usefixtures("_timeline")
 @pytest.mark.parametrize("options", [(), ("--rrd", "fake.rrd")])
 def test_view_opens_the_timeline(til, monkeypatch, options):
     seen = []
@@ -157,8 +198,11 @@ def test_view_opens_the_timeline(til, monkeypatch, options):
 
 
 def test_reproduction_of_one_name_is_one_result(til, tmp_path):
-    data = run_json(til, "reproduce", "fake-table-1", "--seeds", "3", "--jobs", "2")
-    assert (data["name"], data["settings"]) == ("fake-table-1", {"jobs": 2})
+    data = run_json(
+        til, *["reproduce", "fake-table-1", "--seeds", "3", "--jobs", "2", "--duration", "1.5"]
+    )
+    assert data["name"] == "fake-table-1"
+    assert data["settings"] == {"jobs": 2, "duration": 1.5}
     assert data["rows"][0]["seeds"] == 3
     assert (tmp_path / "out" / "fake.png").exists()
 
@@ -177,13 +221,13 @@ def test_reproduction_named_twice_runs_once(til):
 
 
 def test_bench_has_the_same_shape(til, monkeypatch):
-    monkeypatch.setattr(catalogue, "bench", lambda: lambda: make_result("bench", {}, [0]))
+    monkeypatch.setitem(catalogue._TARGETS, "bench", f"{__name__}:bench_fake")
     assert run_json(til, "bench")["name"] == "bench"
 
 
 @pytest.fixture
 def limits(monkeypatch):
-    monkeypatch.setattr(catalogue, "limits", lambda: limit_fake)
+    monkeypatch.setitem(catalogue._TARGETS, "limits", f"{__name__}:limit_fake")
 
 
 @pytest.mark.usefixtures("limits")
@@ -269,7 +313,7 @@ def test_module_runs_as_the_program_does():
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert (run.returncode, run.stdout) == (2, "")
     assert run.stderr.startswith("til: ")
-    assert "no scenario 'no-such-scenario', only mass" in run.stderr
+    assert "no scenario 'no-such-scenario', only ferrari, hard, i3, lane-change" in run.stderr
 
 
 def test_ctrl_c_ends_parallel_work_with_one_line(tmp_path):
@@ -277,16 +321,16 @@ def test_ctrl_c_ends_parallel_work_with_one_line(tmp_path):
 import sys, time
 from scenarios import __main__ as cli
 from scenarios.cli import catalogue
-from scenarios.cli.catalogue import Scenario
-from scenarios.experiment.progress import parallel
+from scenarios.experiment.experiment import Case, Experiment, Recipe
 
-def sleep(i):
-    open({str(tmp_path)!r} + f"/{{i}}", "w").close()
-    time.sleep(60)
+class Slow:
+    def drive(self, case, rng, duration):
+        open({str(tmp_path)!r} + f"/{{rng.integers(1 << 40)}}", "w").close()
+        time.sleep(60)
 
-slow = Scenario(
-    run=lambda s: parallel(sleep, s.seeds, s.jobs, "x"),
-    timeline=None, default_snr=0, vehicle="suv", drive=None, variation=None,
+slow = Experiment(
+    name="slow", cases=(Case(name="slow", plant=Slow(), snr=10.0),),
+    estimators={{"til": Recipe(estimator="til")}}, quantities=(), metrics=lambda trial: [],
 )
 catalogue.scenario = lambda name: slow
 sys.exit(cli.main(["run", "mass", "--seeds", "4", "--jobs", "2"]))

@@ -1,5 +1,4 @@
 import os
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,12 +7,12 @@ from scenarios import ferrari
 from scenarios.__main__ import main
 from scenarios.calibration import ferrari_log
 from scenarios.calibration.free_parameters import FREE
-from scenarios.cli.catalogue import Settings
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
+from scenarios.experiment import engine
+from scenarios.experiment.engine import draw, estimate_on, run_experiment, runs
 from twin import Twin, TwinError, Vehicle
 
-SETTINGS = Settings(snr=float("nan"), seeds=(0,), jobs=1, duration=None)
 HAS_LOG = bool(os.environ.get(ferrari_log.VARIABLE))
 needs_log = pytest.mark.skipif(
     not HAS_LOG, reason=f"the log is not shipped; {ferrari_log.VARIABLE} names its folder"
@@ -106,8 +105,11 @@ def test_estimates_do_not_see_the_truth(own):
     other = {name: values.copy() for name, values in drive.truth.items()}
     for values in other.values():
         values[last] = 7.0
-    for name, estimate in ferrari.ESTIMATORS.items():
-        seen, unseen = estimate(drive), estimate(drive.replace(truth=other))
+    for run in runs(ferrari.EXPERIMENT, [0]):
+        name = run.estimator
+        seen, unseen = (
+            estimate_on(run, one).estimate.sideslip for one in (drive, drive.replace(truth=other))
+        )
         np.testing.assert_array_equal(seen[last], unseen[last], err_msg=name)
 
 
@@ -120,11 +122,13 @@ def test_parts_share_the_log(own):
 
 def test_scenario_scores_every_estimator_and_draws(own, tmp_path, monkeypatch):
     monkeypatch.setenv(ferrari_log.VARIABLE, str(own[0].parent))
-    result = ferrari.run(SETTINGS)
+    monkeypatch.setattr(ferrari, "_log", lambda file: ferrari_log.load(own[0]))
+    result = run_experiment(ferrari.EXPERIMENT, seeds=[0, 1])
+    assert {row.seeds for row in result.rows} == {1}
     found = {(row.case, row.estimator): row.median for row in result.rows}
-    assert {estimator for _, estimator in found} == set(ferrari.ESTIMATORS)
+    assert {estimator for _, estimator in found} == set(ferrari.RECIPES)
     assert found["last third", "static-map"] < found["last third", "zero"]
-    ferrari.picture(SETTINGS, tmp_path / "ferrari.png")
+    draw(ferrari.EXPERIMENT, tmp_path / "ferrari.png", seed=0)
     assert (tmp_path / "ferrari.png").stat().st_size > 10_000
 
 
@@ -137,6 +141,7 @@ def test_calibration_that_ships_lies_within_its_bounds():
 
 @pytest.mark.parametrize("folder", [None, "nowhere"])
 def test_missing_log_is_one_line(folder, monkeypatch, capsys):
+    monkeypatch.setattr(engine, "_DONE", {})
     monkeypatch.delenv(ferrari_log.VARIABLE, raising=False)
     if folder:
         monkeypatch.setenv(ferrari_log.VARIABLE, folder)
@@ -160,16 +165,17 @@ def test_file_that_is_no_such_log_is_refused(tmp_path):
     ("changes", "message"), [({"snr": 10.0}, "snr"), ({"duration": 9.0}, "duration")]
 )
 def test_setting_that_a_log_has_not_is_refused(changes, message):
-
     with pytest.raises(TwinError, match=message):
-        ferrari.run(replace(SETTINGS, **changes))
+        run_experiment(ferrari.EXPERIMENT, seeds=[0], **changes)
 
 
 @needs_log
 @pytest.mark.slow
 def test_twin_knows_the_sideslip_of_the_last_third_within_a_quarter_of_a_degree():
     found = {
-        row.estimator: row.median for row in ferrari.run(SETTINGS).rows if row.case == "last third"
+        row.estimator: row.median
+        for row in run_experiment(ferrari.EXPERIMENT, seeds=[0]).rows
+        if row.case == "last third"
     }
     assert found["til"] <= 0.24
     assert found["til"] < min(value for name, value in found.items() if name != "til")

@@ -1,21 +1,19 @@
 import pytest
 
 from scenarios.__main__ import main
-from scenarios.experiment import state_study
-from scenarios.experiment.state_study import BOUNDS
-from scenarios.tuning import gains
-from scenarios.tuning.tune import Tuned
+from scenarios.experiment import gains_file as gains
+from scenarios.experiment.sideslip_and_mass import BOUNDS, gains_of
 from twin import TwinError
 
-TUNED = Tuned(
-    evaluated={"a": 1.5, "b": 2.5}, predicted={"a": 1.0, "b": 2.0}, cost=0.7, evaluations=8
-)
+GAINS, PREDICTED = {"a": 1.5, "b": 2.5}, {"a": 1.0, "b": 2.0}
 
 
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "gains.toml"
-    gains.write(path, vehicle="suv", estimator="til", tuned=TUNED, made={"seed": 1000})
+    gains.write(
+        path, vehicle="suv", estimator="til", gains=GAINS, predicted=PREDICTED, made={"seed": 1000}
+    )
     return path
 
 
@@ -52,7 +50,7 @@ def test_file_that_is_none_is_named(tmp_path, text, message):
 @pytest.mark.parametrize("estimator", list(BOUNDS))
 @pytest.mark.parametrize("car", ["sports_car", "bmw_320i"])
 def test_shipped_gains_lie_within_their_bounds(car, estimator):
-    for name, value in state_study.gains_of(car, estimator).items():
+    for name, value in gains_of(car, estimator).items():
         low, high = BOUNDS[estimator][name]
         assert low * 0.999 <= value <= high * 1.001
 
@@ -63,7 +61,7 @@ def test_shipped_gains_lie_within_their_bounds(car, estimator):
         (["tune", "laps", "--bounds", "ay_vy", "0.5", "0.1"], "bounds of ay_vy are 0.5 to 0.1"),
         (["tune", "mass", "--bounds", "drift", "1", "2"], "has no gain 'drift'; allowed: mass"),
         (["tune", "laps", "--estimator", "zero"], "estimator is 'zero'; allowed: til"),
-        (["run", "mass", "--gains", "x.toml"], "--gains: mass takes none; allowed: laps"),
+        (["run", "mixed", "--gains", "x.toml"], "--gains: joint on mixed takes none"),
         (["run", "laps", "--gains", "x.toml"], "x.toml: cannot be read"),
     ],
 )

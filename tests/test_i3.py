@@ -68,7 +68,7 @@ def test_without_the_trips_a_sentence_says_where_they_are_looked_for(monkeypatch
 
 def test_noise_and_duration_are_refused(monkeypatch, capsys):
     assert main(["run", "i3", "--snr", "20"]) == 2
-    assert "the trips are measured" in capsys.readouterr().err
+    assert "its noise is given" in capsys.readouterr().err
     assert main(["run", "i3", "--duration", "60"]) == 2
     assert "weighed whole" in capsys.readouterr().err
 

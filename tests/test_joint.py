@@ -1,21 +1,26 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimators.identifiability.report import report
 from estimators.joint.observer import JointObserver, JointSettings
+from scenarios import load_change, mixed, straight
 from scenarios.experiment import joint
-from scenarios.experiment.joint import Run, clean_drive, truth
-from scenarios.experiment.study import variation
+from scenarios.experiment.engine import observe, run_experiment, runs, score
+from scenarios.experiment.experiment import Trial
+from scenarios.experiment.metrics import errors_at_end, true_deltas
 from twin import LOAD, OUTPUTS, PARAMETERS, Ensemble, Twin, TwinError, Vehicle, noise_sd
 from twin.kernel import read_states, step
 
 SD = np.array([0.5] * 3 + [0.02] * 3 + [0.05] * 4)
 SEVEN = LOAD[:7]
+CASE = mixed.EXPERIMENT.cases[0]
 
 
 @pytest.fixture(scope="module")
 def drive():
-    return clean_drive("mixed", "same", 12.0)
+    return CASE.plant.clean(12.0)
 
 
 def observer(drive, *, at=None, **settings):
@@ -48,16 +53,16 @@ def test_cars_of_an_ensemble_are_those_of_its_twins():
 
 
 def test_parameters_at_the_truth_stay_there(drive):
-    run = observer(drive, at=variation()).run(drive)
-    p = len(joint.NAMES)
-    off = np.abs(run.parameters[-1, :p] - truth(drive)[-1])
-    assert (off < 0.05 * run.sd[-1, :p]).all()
+    run = observer(drive, at=CASE.load()).run(drive)
+    truth = true_deltas(Trial(runs(mixed.EXPERIMENT, [0])[0], drive, run))
+    for name in joint.NAMES:
+        assert abs(run[name][-1] - truth[name][-1]) < 0.05 * run.sd_of(name)[-1], name
 
 
 def test_the_load_is_found_without_noise(drive):
     run = observer(drive, parameters=LOAD, sensor_errors=()).run(drive)
     for name in SEVEN:
-        assert run[name][-1] == pytest.approx(variation()[name], rel=0.02), name
+        assert run[name][-1] == pytest.approx(CASE.load()[name], rel=0.02), name
 
 
 def test_shifted_states_are_those_of_a_twin_that_always_had_the_parameter(drive):
@@ -108,14 +113,14 @@ def test_missing_measurements_do_not_spoil_the_estimate(drive):
     y = drive.measurements.copy()
     y[3000:6000, 0] = np.nan
     y[5000:5500] = np.nan
-    run = observer(drive, parameters=SEVEN, at=variation()).run(drive.replace(measurements=y))
+    run = observer(drive, parameters=SEVEN, at=CASE.load()).run(drive.replace(measurements=y))
     assert np.isfinite(run.parameters).all()
-    assert abs(run["mass"][-1] - variation()["mass"]) < 3.0
+    assert abs(run["mass"][-1] - CASE.load()["mass"]) < 3.0
 
 
 def test_steady_straight_drive_changes_nothing_and_identifies_nothing():
-    run = Run(drive="straight", mismatch="imu-bias", snr=10.0, seed=0, duration=6.0)
-    _, estimate = joint.observe(run)
+    case = joint.case("straight", "imu-bias")
+    _, _, estimate = observe(runs(straight.EXPERIMENT, [0], 6.0, cases=[case])[0])
     assert not estimate.parameters.any()
     speed = estimate.estimated.index("speed")  # which the twins follow
     assert not np.delete(estimate.valid, speed, axis=1).any()
@@ -133,7 +138,7 @@ def test_delay_and_bias_of_the_sensors_are_found(drive):
     y[:20] = drive.measurements[0]
     y[:, OUTPUTS.index("ay")] += 0.1
     made = JointObserver(Vehicle.load("suv"), sd, JointSettings(parameters=("mass",)))
-    made.reset(float(drive.truth["vx"][0]), variation())
+    made.reset(float(drive.truth["vx"][0]), CASE.load())
     run = made.run(drive.replace(measurements=y))
     assert run["delay"][-1] == pytest.approx(0.02, abs=2e-4)
     assert run["bias_ay"][-1] == pytest.approx(0.1, abs=0.01)
@@ -167,21 +172,31 @@ def test_noise_of_nothing_is_refused():
 
 
 def test_rows_hold_error_claim_and_validity_of_every_parameter():
-    rows = joint.rows("mixed", "all-scales", 10.0, [0], 1, 3.0)
+    rows = run_experiment(mixed.EXPERIMENT, seeds=[0], duration=3.0).rows
     found = {(row.quantity, row.metric): row.median for row in rows}
     for name in joint.NAMES:
         error, sd = found[name, "pct"], found[name, "claimed_sd_pct"]
         assert found[name, "rmse_over_sd"] == pytest.approx(error / sd)
         assert found[name, "valid"] in (0.0, 1.0)
-    # of one seed: the share of parameters that are off by no more than two standard deviations
-    within = [found[name, "rmse_over_sd"] <= 2.0 for name in joint.NAMES]
-    assert sum(within) > 0
-    assert found["all", "coverage"] == pytest.approx(np.mean(within))
+
+
+def test_coverage_is_the_share_of_errors_within_two_standard_deviations(drive):
+    run = runs(mixed.EXPERIMENT, [0])[0]
+    found = observer(drive).run(drive)
+    truth = true_deltas(Trial(run, drive, found))
+    sd = np.ones_like(found.sd)
+    parameters = found.parameters.copy()
+    for k, name in enumerate(joint.NAMES):  # every other one is off by three standard deviations
+        parameters[-1, PARAMETERS.index(name)] = truth[name][-1] + (3.0 if k % 2 else 1.0)
+    scores = errors_at_end(Trial(run, drive, replace(found, sd=sd, parameters=parameters)))
+    coverage = next(s.value for s in scores if s.metric == "coverage")
+    assert coverage == pytest.approx(np.mean([k % 2 == 0 for k in range(len(joint.NAMES))]))
 
 
 @pytest.mark.slow
 def test_change_of_load_is_found_and_nothing_else_thrown_off():
-    score = joint.score(Run(drive="load-change", mismatch="same", snr=10.0, seed=0))
-    assert score.seconds < 20.0
-    assert score.worst < 3.0
-    assert abs(score.error[0]) < 3.0
+    scores, _ = score(runs(load_change.EXPERIMENT, [0])[0])
+    found = {(s.quantity, s.metric): s.value for s in scores}
+    assert found["load", "found_after"] < 20.0
+    assert found["others", "worst_over_sd"] < 3.0
+    assert found["mass", "pct"] < 3.0 / 355.0 * 100.0

@@ -7,8 +7,7 @@ from estimators.joint.linearisation_error import add_linearisation_error, wait_a
 from estimators.joint.observer import JointObserver, JointSettings
 from estimators.joint.parameter_tracking import track_parameters
 from estimators.joint.state import ABSENT, WAIT
-from scenarios.experiment.joint import clean_drive
-from scenarios.experiment.study import variation
+from scenarios import mixed
 from twin import OUTPUTS, PARAMETERS, Vehicle
 
 SD = np.array([0.5] * 3 + [0.02] * 3 + [0.05] * 4)
@@ -107,12 +106,17 @@ def test_twins_follow_like_a_critically_damped_oscillator(observer):
 
 
 def test_speed_of_the_twins_that_is_off_is_not_taken_for_mass():
-    drive = clean_drive("mixed", "same", 8.0)
+    case = mixed.EXPERIMENT.cases[0]
+    drive, load = case.plant.clean(8.0), case.load()
     errors = {}
     for name, errors_of in (("with", ("speed",)), ("without", ())):
         settings = JointSettings(parameters=("mass",), sensor_errors=errors_of, hold_off=0.1)
         made = JointObserver(Vehicle.load("suv"), SD, settings)
-        made.reset(float(drive.truth["vx"][0]) + 0.15, variation(), road=drive.inputs[0, 9:13])
+        made.reset(
+            float(drive.truth["vx"][0]) + 0.15,
+            mixed.EXPERIMENT.cases[0].load(),
+            road=drive.inputs[0, 9:13],
+        )
         run = made.run(drive)
-        errors[name] = np.abs(run["mass"][:3000] - variation()["mass"]).max()
+        errors[name] = np.abs(run["mass"][:3000] - load["mass"]).max()
     assert errors["with"] < 0.3 * errors["without"]

@@ -5,7 +5,8 @@ import pytest
 
 from estimators.benchmarks.kalman_bucy import KalmanBucy, KalmanBucySettings, matched
 from estimators.benchmarks.kalman_bucy_ode import KalmanBucyOde
-from scenarios.papers.truck_drive import NOISE, TruckCase, make_drive
+from scenarios.experiment.truck import truck_case
+from scenarios.experiment.truck_plant import NOISE
 from twin import TruckParameters, TwinError
 from twin.truck.model import RATES
 from twin.truck.twin import TRUCK_PARAMETERS
@@ -15,7 +16,7 @@ TRUCK, DT = TruckParameters(), 1e-3
 
 @pytest.fixture(scope="module")
 def drive():
-    return make_drive(TruckCase(duration=10.0), 0)
+    return truck_case("a truck").noisy_drive(0, 10.0)
 
 
 LITERAL = KalmanBucySettings(parametrisation="p")

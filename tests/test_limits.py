@@ -1,3 +1,4 @@
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,13 +11,16 @@ from estimators.identifiability.cramer_rao import (
     sensitivities,
 )
 from estimators.score import rms_pct
-from scenarios import mass
-from scenarios.cli.catalogue import Settings
-from scenarios.experiment.study import Case, Run, limit, observe, real_drive, variation
-from scenarios.papers.limits import UNITS, law_limit, run
+from scenarios import lane_change, laps, load_change, mass, truck
+from scenarios.experiment.bounds import law_limit
+from scenarios.experiment.engine import observe, runs
+from scenarios.experiment.single import limit
+from scenarios.report.limits import UNITS, limits_of
 from twin import OUTPUTS, PARAMETER, PARAMETERS, Twin, TwinError, Vehicle, noise_sd
 
 AX = OUTPUTS.index("ax")
+CASE = mass.EXPERIMENT.cases[0]
+LAWS = {name: recipe.laws[0] for name, recipe in mass.EXPERIMENT.estimators.items()}
 SHORT = 16.0  # [s] of the drive through town: start, accelerate, hold, coast; no stop
 
 
@@ -28,9 +32,9 @@ def only(channel, sd):
 def short_sensitivity(parameter, share=1.0):
     return sensitivities(
         Twin(Vehicle.load("suv")),
-        real_drive(mass.STUDY.target, SHORT),
+        CASE.plant.clean(SHORT),
         [parameter],
-        variation(),
+        CASE.load(),
         speed=0.0,
         offsets={parameter: share * PARAMETER[parameter].step},
     )
@@ -189,14 +193,14 @@ def test_least_squares_on_simulated_noise_reach_the_bound():
 # The short drive does not brake.
 @pytest.mark.parametrize("parameter", [n for n in PARAMETERS if n != "brake_torque"])
 def test_half_the_offset_changes_no_sensitivity(parameter):
-    drive = real_drive(mass.STUDY.target, SHORT)
+    drive = CASE.plant.clean(SHORT)
     sd = noise_sd(drive.measurements, 10.0)
     whole, half = (short_sensitivity(parameter, share) / sd for share in (1.0, 0.5))
     assert np.linalg.norm(whole - half) < 0.01 * np.linalg.norm(half)
 
 
 def test_mass_bound_from_acceleration_is_that_of_force_over_mass():
-    drive = real_drive(mass.STUDY.target, SHORT)
+    drive = CASE.plant.clean(SHORT)
     bound = cramer_rao(["mass"], short_sensitivity("mass"), only(AX, 0.5))
     total = Twin(Vehicle.load("suv_loaded")).model.body_mass.sum()
     expected = total * 0.5 / np.sqrt(np.sum(drive.channel("ax") ** 2))  # d(F/M)/dM = -a/M
@@ -207,8 +211,8 @@ def test_sensitivities_hang_on_neither_the_twin_s_past_nor_the_other_parameters(
     twin = Twin(Vehicle.load("suv"))
     twin.set_parameters(np.array([100.0, *np.zeros(len(PARAMETERS) - 1)]))
     twin.reset(30.0)
-    drive = real_drive(mass.STUDY.target, SHORT)
-    both = sensitivities(twin, drive, ["cm_x", "mass"], variation(), speed=0.0)
+    drive = CASE.plant.clean(SHORT)
+    both = sensitivities(twin, drive, ["cm_x", "mass"], CASE.load(), speed=0.0)
     assert both.shape == (2, len(drive), len(OUTPUTS))
     assert (both[1] == short_sensitivity("mass")[0]).all()
 
@@ -224,7 +228,7 @@ def test_parameter_that_cannot_be_set_is_refused(parameters, at, message):
     with pytest.raises(TwinError, match=message):
         sensitivities(
             Twin(Vehicle.load("suv")),
-            real_drive(mass.STUDY.target, SHORT),
+            CASE.plant.clean(SHORT),
             parameters,
             at,
             speed=0.0,
@@ -235,58 +239,70 @@ def test_parameter_that_cannot_be_set_is_refused(parameters, at, message):
 
 
 def test_law_that_uses_all_of_its_channel_has_that_channel_s_bound():
-    drive = real_drive(mass.STUDY.target, SHORT)
+    drive = CASE.plant.clean(SHORT)
     sensitivity, sd = short_sensitivity("mass"), noise_sd(drive.measurements, 10.0)
     paper, default = (
-        law_limit(mass.STUDY.laws[name][0], sensitivity, drive, sd) for name in ("til-paper", "til")
+        law_limit(LAWS[name], sensitivity, drive, sd) for name in ("til-paper", "til")
     )
     assert paper == cramer_rao(["mass"], sensitivity, only(AX, sd[AX])).single[0]
     assert default > paper  # it rests at a standstill and fits an offset
 
 
 def test_default_mass_law_comes_close_to_its_limit():
-    case, law = mass.STUDY.cases[1], mass.STUDY.laws["til"][0]
     errors, duration = [], 10.0
-    for seed in range(20):
-        drive, estimate = observe(
-            Run(
-                study=mass.STUDY.target,
-                estimator="til",
-                case=case,
-                seed=seed,
-                initial=(0.0,),
-                duration=duration,
-            )
-        )
-        errors.append(rms_pct(estimate["mass"], variation()["mass"], drive.dt))
+    for run in runs(mass.EXPERIMENT, range(20), duration, estimators=["til"]):
+        _, drive, estimate = observe(run)
+        errors.append(rms_pct(estimate["mass"], CASE.load()["mass"], drive.dt))
     rms = np.sqrt(np.mean(np.square(errors)))
-    assert rms == pytest.approx(limit(mass.STUDY, case, law, duration), rel=0.5)  # 3 sd of 20 seeds
+    bound = limit(mass.EXPERIMENT, CASE, duration)["mass", "rms_pct"]
+    assert rms == pytest.approx(bound, rel=0.5)  # 3 sd of 20 seeds
 
 
 @pytest.mark.parametrize(
-    "case",
+    "changes",
     [
-        Case(name="noiseless", snr=np.inf),
-        Case(name="wrong CM", snr=10.0, known=("mass",)),
-        Case(name="noisy road", snr=10.0, road_noise=0.1),
-        Case(name="coloured noise", snr=10.0, noise_on="accelerations"),
+        {"snr": np.inf},
+        {"knows": ("mass",)},
+        {"road_noise": 0.1},
+        {"noise_on": "accelerations"},
     ],
+    ids=["noiseless", "wrong CM", "noisy road", "coloured noise"],
 )
-def test_case_that_the_bound_does_not_fit_has_no_limit(case):
-    assert limit(mass.STUDY, case, mass.STUDY.laws["til"][0], SHORT) is None
+def test_case_that_the_bound_does_not_fit_has_no_limit(changes):
+    assert limit(mass.EXPERIMENT, replace(CASE, **changes), SHORT) == {}
 
 
 @pytest.fixture(scope="module")
 def mass_limits():
-    settings = Settings(snr=10.0, seeds=(0,), jobs=1, duration=8.0)
-    return run("mass", mass.SCENARIO, settings)
+    return limits_of(mass.EXPERIMENT, duration=8.0)
+
+
+@pytest.mark.parametrize("experiment", [laps.EXPERIMENT, lane_change.EXPERIMENT])
+def test_limits_of_a_car_with_a_wrong_mass_are_in_percent_of_what_is_missing(experiment):
+    result, text = limits_of(experiment, duration=4.0)
+    rows = {(r.case, r.quantity, r.metric): r.median for r in result.rows}
+    assert 0.0 < rows["all channels", "mass", "limit_single"] < 100.0
+    assert np.isnan(rows["all channels", "Jzz", "limit_single"])  # nothing of it is missing
+    assert ["mass", "kg", "350"] in [line.split()[:3] for line in text.splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("experiment", "message"),
+    [
+        (truck.EXPERIMENT, "limits: truck has none; allowed: a simulated car"),
+        (load_change.EXPERIMENT, "allowed: a car with a constant load"),
+    ],
+)
+def test_drive_without_limits_is_named(experiment, message):
+    with pytest.raises(TwinError, match=message):
+        limits_of(experiment, duration=20.0)
 
 
 def test_rows_are_in_percent_of_the_variation(mass_limits):
     rows = {(r.case, r.quantity, r.metric): r for r in mass_limits[0].rows}
     row = rows["ax alone, moving", "mass", "limit_single"]
     assert (row.estimator, row.unit, row.seeds) == ("cramer-rao", "%", 1)
-    drive = real_drive(mass.STUDY.target, 8.0)
+    drive = CASE.plant.clean(8.0)
     moving = drive.truth["wheel_speed_fl"] >= 3.0
     sd = noise_sd(drive.measurements, 10.0)[AX]
     total = Twin(Vehicle.load("suv_loaded")).model.body_mass.sum()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenarios.driving.manoeuvres import random_road, swept_steer, urban
-from scenarios.experiment.study import TWIN
+from scenarios.experiment.single import TWIN
 from twin import Twin, Vehicle
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from estimators.til.observer import Observer
+from scenarios import mass
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
-from scenarios.mass import STUDY
 from twin import FURTHER_OUTPUTS, INPUTS, OUTPUTS, WHEELS, Drive, Twin, TwinError, Vehicle
 from twin.logs.map import TORQUES, LogMap
 from twin.logs.units import GRAVITY
@@ -104,7 +104,7 @@ def test_log_in_sae_axes_and_everyday_units_is_the_drive_it_was_recorded_from(lo
 def test_estimate_from_the_mapped_log_is_that_from_the_drive(log, suv_drive):
     estimates = []
     for drive in (suv_drive, Drive.load(*log)):
-        observer = Observer(Twin(Vehicle.load("suv")), STUDY.laws["til"])
+        observer = Observer(Twin(Vehicle.load("suv")), mass.EXPERIMENT.estimators["til"].laws)
         observer.reset(speed=20.0)
         estimates.append(observer.run(drive)["mass"])
     assert np.ptp(estimates[0]) > 10.0

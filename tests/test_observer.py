@@ -7,11 +7,12 @@ from estimators.til.observer import Observer
 from scenarios import mass
 from scenarios.driving.manoeuvres import urban
 from scenarios.driving.record import record
-from scenarios.experiment.study import CM, variation
+from scenarios.experiment.experiment import CM
 from twin import OUTPUTS, PARAMETERS, STATES, Twin, TwinError, Vehicle, with_noise
 
 DURATION = 12.0
-(TIL,), (PAPER,) = mass.STUDY.laws.values()
+LAWS = {name: recipe.laws for name, recipe in mass.EXPERIMENT.estimators.items()}
+(TIL,), (PAPER,) = LAWS.values()
 
 
 @pytest.fixture(scope="module")
@@ -29,21 +30,21 @@ def observer(*laws, gains=None):
 
 
 def known():
-    return {name: variation()[name] for name in CM}
+    return {name: mass.EXPERIMENT.cases[0].load()[name] for name in CM}
 
 
 def test_twin_that_knows_the_load_repeats_the_vehicle(clean):
     open_loop = observer()
-    open_loop.reset(0.0, variation())
+    open_loop.reset(0.0, mass.EXPERIMENT.cases[0].load())
     estimate = open_loop.run(clean)
     np.testing.assert_allclose(estimate.outputs, clean.measurements, atol=1e-9)
     truth = np.column_stack([clean.truth[name] for name in STATES])
     np.testing.assert_allclose(estimate.states, truth, atol=1e-9)
 
 
-@pytest.mark.parametrize("law", list(mass.STUDY.laws))
+@pytest.mark.parametrize("law", list(LAWS))
 def test_each_mass_law_converges_without_noise(clean, law):
-    til = observer(mass.STUDY.laws[law][0])
+    til = observer(LAWS[law][0])
     til.reset(0.0, known())
     error = til.run(clean)["mass"] - 355.0
     assert error[0] < -350.0
@@ -60,7 +61,7 @@ def test_gain_with_the_printed_sign_would_run_away(clean):
 
 def test_mass_stays_where_the_twin_is_right(clean):
     til = observer(TIL)
-    til.reset(0.0, variation())
+    til.reset(0.0, mass.EXPERIMENT.cases[0].load())
     np.testing.assert_allclose(til.run(clean)["mass"], 355.0, atol=1e-6)
 
 
@@ -70,7 +71,7 @@ def test_measured_sign_is_biased_by_noise_and_the_twin_is_not(drive):
     for instrument in ("measured", "twin"):
         law = dataclasses.replace(PAPER, instrument=instrument, gain=20.0, least_wheel_speed=3.0)
         til = observer(law)
-        til.reset(0.0, variation())
+        til.reset(0.0, mass.EXPERIMENT.cases[0].load())
         drift[instrument] = til.run(drive)["mass"][-1] - 355.0
     assert abs(drift["measured"]) > 15.0
     assert abs(drift["twin"]) < 3.0
@@ -106,7 +107,7 @@ def test_linear_law_pulls_a_state_to_its_measurement(clean):
     error = {}
     for name, k in (("free", None), ("pulled", gains)):
         til = observer(slow, gains=k)
-        til.reset(1.0, variation())
+        til.reset(1.0, mass.EXPERIMENT.cases[0].load())
         error[name] = abs(til.run(clean)["vx"][-1] - clean.truth["vx"][-1])
     assert error["pulled"] < 0.2 * error["free"]
 

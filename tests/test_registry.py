@@ -9,8 +9,9 @@ from estimators.benchmarks.single_track import START, Geometry
 from estimators.benchmarks.static_map import StaticMap
 from estimators.entry import Entry, Given
 from estimators.til.law import ParameterLaw
-from scenarios.papers.joint_peers import STAGED_LAWS
-from scenarios.papers.truck_drive import SAMPLE_TIME, TruckCase, make_drive
+from scenarios.experiment.laws import ALL_LAWS as STAGED_LAWS
+from scenarios.experiment.truck import CASES
+from scenarios.experiment.truck_plant import SAMPLE_TIME
 from scenarios.tuning import double_track_fit
 from twin import OUTPUTS, TruckParameters, TwinError, Vehicle
 
@@ -26,7 +27,7 @@ def car_drive():
 
 @pytest.fixture(scope="module")
 def truck_drive():
-    return make_drive(TruckCase(duration=0.5), 0)
+    return CASES[0].noisy_drive(0, 0.5)
 
 
 def given_for(name, noise):

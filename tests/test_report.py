@@ -9,6 +9,7 @@ import pytest
 from scenarios import __main__ as cli
 from scenarios.cli.catalogue import REPRODUCTIONS, Entry
 from scenarios.experiment.result import Result, Row
+from scenarios.papers.reproduction import Making
 from scenarios.report.html import PictureOf, Section, write_report
 
 PNG = base64.b64decode(
@@ -19,21 +20,21 @@ SUMMARY = "a <b>bold</b> & quick table"
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
-def reproduce_table(seeds, jobs, out):
+def reproduce_table(making):
     row = Row(
         case="noisy <CM>", quantity="mass", metric="rms_pct", unit="%", estimator="til",
-        seeds=seeds, median=0.912, p90=1.7, limit=0.8,
+        seeds=len(making.seeds), median=0.912, p90=1.7, limit=0.8,
     )  # fmt: skip
     return Result(name=NAMES[0], settings={"road": ["<flat>", 1]}, seconds=1.25, rows=[row, row])
 
 
-def reproduce_figure(seeds, jobs, out):
-    (out / f"{NAMES[1]}.png").write_bytes(PNG)
+def reproduce_figure(making):
+    (making.out / f"{NAMES[1]}.png").write_bytes(PNG)
     row = Row(
         case="SNR 5 dB", quantity="Jxx", metric="rms_pct", unit="%", estimator="til",
-        seeds=seeds, median=9.0, p90=12.0,
+        seeds=len(making.seeds), median=9.0, p90=12.0,
     )  # fmt: skip
-    return Result(name=NAMES[1], settings={"seeds": seeds}, seconds=2.0, rows=[row])
+    return Result(name=NAMES[1], settings={"seeds": len(making.seeds)}, seconds=2.0, rows=[row])
 
 
 class Page(HTMLParser):
@@ -138,7 +139,7 @@ def test_picture_that_is_written_again_unchanged_is_of_this_run(tmp_path):
 def test_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     path = tmp_path / "report.html"
     path.write_text("old")
-    result = reproduce_table(1, 1, tmp_path)
+    result = reproduce_table(Making(seeds=(0,), jobs=1, out=tmp_path))
     monkeypatch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(OSError("disk")))
     with pytest.raises(OSError, match="disk"):
         write_report([Section(result=result, summary="", picture=None)], path)

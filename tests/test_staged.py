@@ -4,10 +4,10 @@ from cars import drive_of_other_car
 from scipy.signal import lfilter
 
 from estimators.ensemble.staged import CM, Stage, StagedObserver, StagedSettings
+from scenarios import mass
 from scenarios.driving.joint_drives import mixed
 from scenarios.driving.record import record
-from scenarios.experiment import study
-from scenarios.papers.joint_peers import STAGED_LAWS
+from scenarios.experiment.laws import ALL_LAWS as STAGED_LAWS
 from twin import PARAMETER, TwinError, Vehicle, noise_sd, with_noise
 
 # Short stages for a short drive
@@ -60,7 +60,7 @@ def test_each_parameter_moves_in_its_own_stage_alone(staged_run):
 
 
 def test_staged_observer_finds_mass_and_cm_of_the_load(staged_run):
-    variation = study.variation()
+    variation = mass.EXPERIMENT.cases[0].load()
     # seconds for each, on a car that is wrong in all the rest
     assert staged_run["mass"][-1] == pytest.approx(variation["mass"], rel=0.15)
     for name in CM:

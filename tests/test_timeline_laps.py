@@ -1,20 +1,17 @@
 import numpy as np
-import pytest
 from rerun.chunk import RrdReader
 
-from scenarios.experiment.state_study import Run, observe
+from scenarios import lane_change
+from scenarios.experiment.engine import first_trials
 from scenarios.timeline import laps as timeline_laps
-from twin import TwinError
+from scenarios.timeline.write import write
 
-RUNS = [
-    Run(case="mismatched", drive="lane-change", estimator=name, duration=3.0)
-    for name in ("til", "double-track")
-]
+DURATION = 3.0
 
 
 def test_timeline_has_both_observers_gates_and_the_ghost(tmp_path):
     path = tmp_path / "laps.rrd"
-    timeline_laps.write(path, RUNS, title="lane changes")
+    write(lane_change.EXPERIMENT, path, seed=0, duration=DURATION)
     (store,) = RrdReader(path).recordings()
     found = RrdReader(path).stream(store=store).to_chunks()
     entities = {str(chunk.entity_path) for chunk in found}
@@ -27,13 +24,8 @@ def test_timeline_has_both_observers_gates_and_the_ghost(tmp_path):
 
 
 def test_gate_is_open_only_straight_ahead_and_under_force():
-    drive, belief = observe(RUNS[0])
-    open_ = timeline_laps.gates(drive, belief.estimate)
+    (trial,) = first_trials(lane_change.EXPERIMENT, 0, duration=DURATION)
+    open_ = timeline_laps.gates(trial.drive, trial.estimate)
     both = open_["straight ahead"] * open_["speeding up or braking"]
     np.testing.assert_array_equal(open_["mass is corrected"], both)
     assert 0.0 < both.mean() < 1.0
-
-
-def test_timeline_without_the_default_observer_is_refused(tmp_path):
-    with pytest.raises(TwinError, match="a timeline needs a run of til"):
-        timeline_laps.write(tmp_path / "x.rrd", RUNS[1:], title="lane changes")

@@ -4,21 +4,26 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from scenarios.papers.truck_drive import TruckCase, make_drive
-from scenarios.papers.truck_estimators import ESTIMATORS
+from scenarios import truck
+from scenarios.experiment.engine import first_trials
 from scenarios.timeline.truck import write_truck_timeline
 from twin import TwinError
 from twin.truck.parameters import SprungMass
 
 
 @pytest.fixture(scope="module")
-def drive():
-    return make_drive(TruckCase(duration=1.0), 0)
+def trial():
+    return first_trials(truck.EXPERIMENT, 0, duration=1.0, estimators=["kalman-bucy"])[0]
 
 
 @pytest.fixture(scope="module")
-def found(drive):
-    return ESTIMATORS["kalman-bucy"](TruckCase(), drive)
+def drive(trial):
+    return trial.drive
+
+
+@pytest.fixture(scope="module")
+def found(trial):
+    return trial.estimate
 
 
 @pytest.fixture(scope="module")

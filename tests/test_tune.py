@@ -5,12 +5,13 @@ import tomllib
 
 import pytest
 
-from scenarios import mass, roll_yaw
-from scenarios.cli.catalogue import Tuning
-from scenarios.tuning import laws as tune_laws
-from scenarios.tuning import states as tune_states
+from scenarios import ferrari, laps, mass, mixed, roll_yaw
+from scenarios.experiment import single
+from scenarios.experiment.experiment import Gain, Score
+from scenarios.experiment.laws import gains_of, with_gains
+from scenarios.tuning import run as tuning
 from scenarios.tuning import tune
-from scenarios.tuning.tune import Gain, Objective
+from scenarios.tuning.tune import Objective
 from twin import TwinError
 
 GAINS = (
@@ -113,83 +114,79 @@ def test_bounds_that_make_no_sense_are_named(bounds, message):
 
 
 def test_gains_of_laws_are_put_where_they_belong():
-    laws = roll_yaw.STUDY.laws["til-paper"]
-    assert [gain.name for gain in tune_laws.gains_of(laws)] == ["Jxx gain", "Jzz gain"]
-    changed = tune_laws.with_gains(laws, {"Jxx gain": 7.0, "Jzz gain": 11.0})
+    laws = roll_yaw.EXPERIMENT.estimators["til-paper"].laws
+    assert [gain.name for gain in gains_of(laws)] == ["Jxx gain", "Jzz gain"]
+    changed = with_gains(laws, {"Jxx gain": 7.0, "Jzz gain": 11.0})
     assert [(law.parameter, law.gain) for law in changed] == [("Jxx", 7.0), ("Jzz", 11.0)]
 
 
+def runs_of(experiment, estimator="til", cost="robust", gains=()):
+    return experiment.costs[cost].runs(experiment, estimator, gains)
+
+
 def test_cases_that_count_are_those_of_a_right_twin():
-    assert [case.name for case in tune_laws.cases_of(mass.STUDY)] == [
-        "noiseless, correct CM",
-        "noisy, correct CM",
-    ]
-    assert all("wrong" not in case.name for case in tune_laws.cases_of(roll_yaw.STUDY))
+    names = list(dict.fromkeys(run.case.name for run in runs_of(mass.EXPERIMENT)))
+    assert names == ["noiseless, correct CM", "noisy, correct CM"]
+    assert all("wrong" not in run.case.name for run in runs_of(roll_yaw.EXPERIMENT))
 
 
 def test_no_reported_seed_tunes():
-    assert min(*tune_laws.SEEDS, tune_states.SEED) >= 1000
+    for experiment in (mass.EXPERIMENT, laps.EXPERIMENT):
+        for cost in experiment.costs:
+            assert min(run.seed for run in runs_of(experiment, cost=cost)) >= 1000
+
+
+def figures(**values):
+    """Scores of a run that has these figures, named quantity and metric."""
+    return [Score(*name.split("__"), "1", value) for name, value in values.items()]
 
 
 def test_cost_of_laws_is_the_geometric_mean_over_parameters_and_cases(monkeypatch):
-    monkeypatch.setattr(tune_laws, "score", lambda run, laws: [(2.0, 0.0), (8.0, 0.0)])
-    gains = {"Jxx gain": 7.0, "Jzz gain": 11.0}
-    cost = tune_laws.Cost(roll_yaw.STUDY.target, "til-paper")(gains)
-    assert cost == pytest.approx(4.0)
+    found = figures(Jxx__rms_pct=2.0, Jxx__time_to_10pct=70.0, Jzz__rms_pct=8.0)
+    monkeypatch.setattr(tuning, "score", lambda run: (found, ()))
+    cost = tuning.RunCost(roll_yaw.EXPERIMENT, "til-paper", "robust")
+    assert cost({"Jxx gain": 7.0, "Jzz gain": 11.0}) == pytest.approx(4.0)
 
 
-def test_result_of_a_study_is_on_file_with_what_made_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(tune_laws, "score", lambda run, laws: [(laws[0].gain, 0.0)] * 2)
+def test_result_of_a_tuning_is_on_file_with_what_made_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        tuning, "score", lambda run: (figures(Jxx__rms_pct=dict(run.gains)["Jxx gain"]), ())
+    )
     path = tmp_path / "a.toml"
-    result = tune_laws.run(roll_yaw.STUDY, tuning(path, estimator="til-paper"))
+    result = tuning.tune(roll_yaw.EXPERIMENT, "til-paper", path, evaluations=4)
     written = tomllib.loads(path.read_text())
     assert (written["vehicle"], written["estimator"]) == ("suv", "til-paper")
-    assert written["made"]["tuning"] == "roll-yaw"
-    assert written["made"]["seeds"] == list(tune_laws.SEEDS)
+    assert written["made"]["tuning"] == "til tune roll-yaw"
+    assert written["made"]["seeds"] == list(single.SEEDS)
     rows = {(row.case, row.quantity): row.median for row in result.rows}
     assert rows["best evaluated", "Jxx gain"] == written["gains"]["Jxx gain"]
     assert rows["best predicted", "Jxx gain"] == written["predicted"]["Jxx gain"]
     assert list(tmp_path.iterdir()) == [path]
 
 
-def tuning(path, **changes):
-    return Tuning(**{"estimator": "til", "evaluations": 4, "jobs": 1, "path": path} | changes)
-
-
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("experiment", "estimator", "changes", "message"),
     [
-        ({"estimator": "best"}, "estimator is 'best'; allowed: til, til-paper"),
-        ({"cost": "paper"}, "cost is 'paper'; mass allows: robust"),
+        (mass, "best", {}, "estimator is 'best'; allowed: til, til-paper"),
+        (mass, "til", {"cost": "paper"}, "cost is 'paper'; allowed: robust"),
+        (laps, "zero", {}, "estimator is 'zero'; allowed: til, til-paper, double-track"),
+        (laps, "til", {"cost": "cheap"}, "cost is 'cheap'; allowed: robust, paper"),
+        (laps, "til", {"bounds": {"ay_vy": (0.5, 0.1)}}, "bounds of ay_vy are 0.5 to 0.1"),
+        (mixed, "joint", {}, "mixed has no gains to choose"),
+        (ferrari, "til", {"cost": "robust"}, "ferrari takes no --bounds and no --cost"),
     ],
 )
-def test_what_a_study_cannot_tune_is_named(tmp_path, changes, message):
+def test_what_cannot_be_tuned_is_named(tmp_path, experiment, estimator, changes, message):
     with pytest.raises(TwinError, match=message):
-        tune_laws.run(mass.STUDY, tuning(tmp_path / "x.toml", **changes))
+        tuning.tune(experiment.EXPERIMENT, estimator, tmp_path / "x.toml", evaluations=4, **changes)
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"estimator": "zero"}, "estimator is 'zero'; allowed: til, til-paper, double-track"),
-        ({"cost": "cheap"}, "cost is 'cheap'; allowed: robust, paper"),
-        ({"bounds": {"ay_vy": (0.5, 0.1)}}, "bounds of ay_vy are 0.5 to 0.1"),
-    ],
-)
-def test_what_the_states_cannot_be_tuned_by_is_named(tmp_path, changes, message):
-    with pytest.raises(TwinError, match=message):
-        tune_states.run("mismatched", tuning(tmp_path / "x.toml", **changes))
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_costs_of_the_states_are_those_of_their_formulas(monkeypatch):
-    from scenarios.experiment.state_study import Score
-
-    one = Score(
-        sideslip=0.2, mass=31.1858, mass_at_end=0.0, mass_last_10s=7.0, axle_force=(0.0, 0.0)
+def test_costs_of_sideslip_and_mass_are_those_of_their_formulas(monkeypatch):
+    one = figures(sideslip__rmse=0.2, mass__rmse_last_60s=31.1858, mass__rmse_last_10s=7.0)
+    monkeypatch.setattr(tuning, "score", lambda run: (one, ()))
+    robust, paper = (
+        tuning.RunCost(laps.EXPERIMENT, "til", name)({}) for name in laps.EXPERIMENT.costs
     )
-    monkeypatch.setattr(tune_states, "score", lambda run: one)
-    robust, paper = (tune_states.Cost("same", "til", name)({}) for name in tune_states.COSTS)
     assert robust == pytest.approx(0.2 / 0.1 + 2.0)  # 31.2 kg are 2 % of 1559.29 kg
     assert paper == pytest.approx(10.0 * 0.2 + 7.0)

@@ -97,6 +97,7 @@ class Observer:
         self.dt = every * twin.dt  # between corrections [s]
         self._every = every
         self._needed = tuple(dict.fromkeys(law.output for law in laws))
+        self._estimated = tuple(dict.fromkeys(law.parameter for law in laws))
         self._follower = follower
         if follower:
             check_follower(follower)
@@ -243,6 +244,7 @@ class Observer:
             outputs=outputs,
             extended=extended.reshape(n, -1),
             nominal=twin.car.nominal.copy(),
+            estimated=self._estimated,
             trustworthy=trustworthy,
         )
 
@@ -268,6 +270,7 @@ class Observer:
             parameter_names=twin.parameters,
             output_names=twin.outputs,
             extended_names=(),
+            estimated=self._estimated,
             trustworthy=trustworthy,
         )
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from estimators.joint.observer import JointObserver, JointSettings
 from estimators.til.observer import Observer
+from scenarios import mass
 from scenarios.driving.manoeuvres import urban
 from scenarios.driving.record import record
 from scenarios.experiment.progress import progress
 from scenarios.experiment.result import Result, Row
-from scenarios.mass import STUDY
 from twin import LOAD, Drive, Twin, Vehicle, with_noise
 
 BLOCK = 5.0  # [s] of driving per measurement of what is compared
@@ -57,7 +57,7 @@ def _part(drive: Drive, start: float, duration: float) -> Drive:
 
 
 def _observer() -> Observer:
-    return Observer(Twin(Vehicle.load("suv")), STUDY.laws["til"])
+    return Observer(Twin(Vehicle.load("suv")), mass.EXPERIMENT.estimators["til"].laws)
 
 
 def _seconds(task: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:

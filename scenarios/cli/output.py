@@ -30,7 +30,7 @@ def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__:
 def print_table(result: Result, text: str | None = None) -> None:
     """Shows the text, or the rows if there is none, under the result's name."""
     click.echo(f"{result.name} ({result.seconds:.1f} s)\n{text or result.table()}")
-    for sentence in result.settings.get("report", ()):
+    for sentence in result.settings.get("notes", ()):
         click.echo(sentence)
 
 

@@ -3,11 +3,12 @@
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
 from scenarios.cli import catalogue
-from scenarios.cli.catalogue import REPRODUCTIONS, SCENARIOS, Scenario, Settings, Tuning
+from scenarios.cli.catalogue import REPRODUCTIONS, SCENARIOS
 from scenarios.cli.options import (
     STANDARD_OUTPUT,
     Mistake,
@@ -43,13 +44,20 @@ def list_() -> None:
 @jobs_option
 @duration_option
 @click.option(
+    "--estimator",
+    "estimators",
+    multiple=True,
+    metavar="NAME",
+    help="Run this estimator instead of the scenario's own; may be given several times.",
+)
+@click.option(
     "--rrd", type=OutputFile(suffix=".rrd"), metavar="FILE", help="Write the Rerun timeline."
 )
 @click.option(
     "--gains",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Gains of the default estimator, as `til tune` writes them.",
+    help="Gains of the first estimator, as `til tune` writes them.",
 )
 @click.option(
     "--png", type=OutputFile(suffix=".png"), metavar="FILE", help="Draw the scenario's picture."
@@ -64,6 +72,7 @@ def run(
     seeds: int,
     jobs: int,
     duration: float | None,
+    estimators: tuple[str, ...],
     rrd: Path | None,
     gains: Path | None,
     png: Path | None,
@@ -75,33 +84,33 @@ def run(
 
     The timeline shows the first seed.
     """
-    from scenarios.experiment.progress import cluster  # not at the top: it imports joblib
-
-    scenario = catalogue.scenario(name)
-    settings = Settings(
-        snr=scenario.default_snr if snr is None else snr,
-        seeds=tuple(range(seed, seed + seeds)),
-        jobs=jobs,
-        duration=duration,
-        gains=gains,
-    )
-    if gains and not scenario.takes_gains:
-        raise Mistake(f"--gains: {name} takes none; allowed: laps, lane-change")
-    with cluster(dask):
-        result = scenario.run(settings)
+    experiment = catalogue.scenario(name)
+    settings: dict[str, Any] = {"snr": snr, "duration": duration, "estimators": estimators}
+    if gains:
+        settings["gains"] = catalogue.find("gains")(gains, experiment, estimators)
+    with catalogue.find("cluster")(dask):
+        result = catalogue.find("run")(
+            experiment, seeds=range(seed, seed + seeds), jobs=jobs, **settings
+        )
     report(result, json_path)
     if rrd:
-        scenario.timeline(settings, rrd)
+        catalogue.find("timeline")(experiment, rrd, seed=seed, **settings)
     if png:
-        scenario.picture(settings, png)
-    if view:
-        _view(scenario, settings, rrd)
+        catalogue.find("picture")(experiment, png, seed=seed, **settings)
+    if view and rrd:
+        catalogue.find("view")(rrd)
+    elif view:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "timeline.rrd")
+            catalogue.find("timeline")(experiment, path, seed=seed, **settings)
+            catalogue.find("view")(path)
 
 
 @click.command()
 @click.argument("names", metavar="[NAME]...", type=Name("reproduction", REPRODUCTIONS), nargs=-1)
 @count_option("--seeds", 20, "How many seeds, counted up from 0.")
 @jobs_option
+@duration_option
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -116,6 +125,7 @@ def reproduce(
     names: tuple[str, ...],
     seeds: int,
     jobs: int,
+    duration: float | None,
     out: Path,
     dask: str | None,
     json_path: Path | None,
@@ -126,18 +136,19 @@ def reproduce(
 
     JSON of one is that result; of several it is {"results": [...]} with one such object each.
     """
-    from scenarios.experiment.progress import cluster  # not at the top: it imports joblib
-
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Mistake(f"--out: {out} cannot be written: {error.strerror}") from error
     page = OutputFile().convert(out / "report.html", None, None)
+    making = catalogue.find("making")(
+        seeds=tuple(range(seeds)), jobs=jobs, out=out, duration=duration
+    )
     sections: list[Section] = []
-    with cluster(dask):
+    with catalogue.find("cluster")(dask):
         for name in dict.fromkeys(names or REPRODUCTIONS):
             picture = PictureOf(out, name)
-            result = catalogue.reproduction(name)(seeds, jobs, out)
+            result = catalogue.reproduction(name)(making)
             if json_path != STANDARD_OUTPUT:
                 click.echo("\n" * bool(sections), nl=False)  # between tables
                 print_table(result)
@@ -155,16 +166,12 @@ def reproduce(
 @duration_option
 @json_option
 def limits(name: str, snr: float | None, duration: float | None, json_path: Path | None) -> None:
-    """Bound what the drive of scenario NAME can tell of the load at all.
+    """Bound how well the drive of scenario NAME lets the load be estimated at all.
 
     Shows the least standard deviation that an unbiased estimator can have (Cramer-Rao), of each
     parameter singly and of all jointly, and how the joint errors are correlated.
     """
-    scenario = catalogue.scenario(name)
-    settings = Settings(
-        snr=scenario.default_snr if snr is None else snr, seeds=(0,), jobs=1, duration=duration
-    )
-    result, text = catalogue.limits()(name, scenario, settings)
+    result, text = catalogue.find("limits")(catalogue.scenario(name), snr, duration)
     report(result, json_path, text)
 
 
@@ -201,36 +208,25 @@ def tune(
     Bayesian optimisation, in batches of four; FILE holds the best point tried and the one predicted
     best. A tuning that was interrupted goes on from the journal beside FILE.
     """
-    tuning = Tuning(
-        estimator=estimator,
+    path = out or Path("out", f"tune-{name}.toml")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    result = catalogue.find("tune")(
+        catalogue.scenario(name),
+        estimator,
+        path,
         evaluations=evaluations,
         jobs=jobs,
-        path=out or Path("out", f"tune-{name}.toml"),
         bounds={gain: (low, high) for gain, low, high in bounds},
         cost=cost,
     )
-    tuning.path.parent.mkdir(parents=True, exist_ok=True)
-    report(catalogue.scenario(name).tune(tuning), json_path)
+    report(result, json_path)
 
 
 @click.command()
 @json_option
 def bench(json_path: Path | None) -> None:
     """Measure the speed, as ratios taken side by side."""
-    report(catalogue.bench()(), json_path)
-
-
-def _view(scenario: Scenario, settings: Settings, rrd: Path | None) -> None:
-    """Shows the timeline, one written for the purpose if none was asked for."""
-    from scenarios.timeline.timeline import view  # not at the top: it imports Rerun
-
-    if rrd:
-        view(rrd)
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "timeline.rrd")
-        scenario.timeline(settings, path)
-        view(path)
+    report(catalogue.find("bench")(), json_path)
 
 
 COMMANDS = (list_, run, reproduce, limits, tune, bench)

@@ -5,11 +5,12 @@ from numpy.typing import NDArray
 
 from scenarios.driving.manoeuvres import suv_wheelbase
 from scenarios.driving.record import Manoeuvre, record
-from twin import Drive, Vehicle
+from twin import Drive, TwinError, Vehicle
 
 Array = NDArray[np.float64]
 
 DT = 0.001
+SHORTEST_HALF = 10.0  # [s] of a drive with a load change: a start and a stop take nine
 
 
 def _ramps(parts: list[tuple[float, float]], n: int, dt: float) -> Array:
@@ -154,13 +155,26 @@ def half_of_a_trip(dt: float = DT, duration: float | None = None) -> Manoeuvre:
     )
 
 
-def load_change(before: Vehicle, after: Vehicle) -> Drive:
+def load_change(before: Vehicle, after: Vehicle, duration: float | None = None) -> Drive:
     """Two halves of a trip; what is on board changes while the car stands between them.
 
     The halves are recorded one after the other, each from a settled standstill: that the body rises
     as somebody gets out is not shown, that it has risen is.
+
+    Args:
+        before: the car of the first half.
+        after: that of the second.
+        duration: of the whole [s]; None: 80 s.
+
+    Raises:
+        TwinError: it is too short for a start and a stop in each half.
     """
-    halves = [record(vehicle, half_of_a_trip()) for vehicle in (before, after)]
+    half = None if duration is None else 0.5 * duration
+    if half is not None and half < SHORTEST_HALF:
+        raise TwinError(
+            f"load change: duration is {duration:g} s; allowed: {2.0 * SHORTEST_HALF:g} or more"
+        )
+    halves = [record(vehicle, half_of_a_trip(duration=half)) for vehicle in (before, after)]
     first, second = halves
     return first.replace(
         time=np.arange(len(first) + len(second)) * first.dt,

@@ -108,11 +108,18 @@ class Result:
         """The result in types that JSON has; NaN and infinity become None."""
         return _plain({f.name: getattr(self, f.name) for f in fields(self)})
 
+    def columns(self) -> dict[str, list[Any]]:
+        """The rows by column; paper and limit only if a row has one."""
+        columns = {f.name: [getattr(row, f.name) for row in self.rows] for f in fields(Row)}
+        return {
+            name: values
+            for name, values in columns.items()
+            if name not in OPTIONAL_COLUMNS or any(value is not None for value in values)
+        }
+
     def table(self) -> str:
-        """The rows as aligned text, 3 significant digits; paper and limit only if a row has one."""
-        names = [f.name for f in fields(Row)]
-        empty = {n for n in OPTIONAL_COLUMNS if all(getattr(r, n) is None for r in self.rows)}
-        return _aligned({n: [getattr(r, n) for r in self.rows] for n in names if n not in empty})
+        """The rows as aligned text, 3 significant digits."""
+        return _aligned(self.columns())
 
 
 def write_json(data: dict[str, Any], path: Path) -> None:
@@ -164,16 +171,17 @@ def _aligned(columns: dict[str, list[Any]]) -> str:
     """Text to the left, numbers to the right, headings and values in columns."""
     shown = []
     for name, values in columns.items():
-        cells = [name, *map(_cell, values)]
+        cells = [name, *map(cell, values)]
         width = max(map(len, cells))
         is_text = any(isinstance(value, str) for value in values)
-        shown.append([cell.ljust(width) if is_text else cell.rjust(width) for cell in cells])
+        shown.append([text.ljust(width) if is_text else text.rjust(width) for text in cells])
     lines = ["  ".join(line).rstrip() for line in zip(*shown, strict=True)]
     rule = "  ".join("-" * len(column[0]) for column in shown)
     return "\n".join([lines[0], rule, *lines[1:]])
 
 
-def _cell(value: Any) -> str:
+def cell(value: Any) -> str:
+    """A value of a row as text, 3 significant digits."""
     if value is None:
         return "-"
     if isinstance(value, str | int):

@@ -1,8 +1,8 @@
 """TiL Figures 4 to 11: ours, with what can be read off the paper."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,175 +10,161 @@ from numpy.typing import NDArray
 
 from estimators.score import settling_time
 from scenarios import mass, pitch, roll_yaw
-from scenarios.experiment.progress import parallel
-from scenarios.experiment.result import Result, Row
-from scenarios.experiment.study import (
-    Case,
-    Run,
-    Study,
-    find,
-    limit,
-    noisy_drive,
-    observe,
-    real_drive,
-    scores,
-    variation,
-)
+from scenarios.experiment.engine import observe, rows, runs, scores
+from scenarios.experiment.experiment import CarPlant, Case, Experiment, Score, Trial
+from scenarios.experiment.result import Result
+from scenarios.papers.reproduction import Clock, Making
 from scenarios.report import pictures
+from twin import Drive
 
 SNR = (5.0, 7.5, 10.0, 15.0, 20.0)  # [dB], TiL Figures 5, 7, 8, 10
 ROAD_NOISE = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25)  # half widths of Eq. (17), TiL Figure 11
 STARTS = (-0.5, 0.0, 1.0, 2.0)  # shares of the variation believed at the start
-LIMIT = 10.0  # [%], what the paper accepts
+ACCEPTED = 10.0  # [%], what the paper accepts
 LAST = 0.5  # share of the drive in which the worst error counts
 UNITS = {"mass": "kg", "Jxx": "kg m2", "Jyy": "kg m2", "Jzz": "kg m2"}
 EVERY = 50  # samples to a point of a line
+MASS, ROLL_YAW, PITCH = mass.EXPERIMENT, roll_yaw.EXPERIMENT, pitch.EXPERIMENT
 
 
-def figure_4(seeds: int, jobs: int, out: Path) -> Result:
+def figure_4(making: Making) -> Result:
     """Mass over time, from several initial errors; the speed below."""
-    return _over_time("til-figure-4", mass.STUDY, [mass.STUDY.cases[1]], "vx", seeds, jobs, out)
+    return _over_time("til-figure-4", MASS, MASS.table[1:2], "vx", making)
 
 
-def figure_5(seeds: int, jobs: int, out: Path) -> Result:
+def figure_5(making: Making) -> Result:
     """Error of the mass over the noise."""
-    return _over_noise("til-figure-5", mass.STUDY, mass.STUDY.cases[1], "mass", seeds, jobs, out)
+    return _over_noise("til-figure-5", MASS, MASS.table[1], "mass", making)
 
 
-def figure_6(seeds: int, jobs: int, out: Path) -> Result:
+def figure_6(making: Making) -> Result:
     """Roll and yaw inertia over time, mass wrong; above CM right, below CM wrong."""
-    cases = roll_yaw.STUDY.cases[3:5]
-    return _over_time("til-figure-6", roll_yaw.STUDY, cases, "steering", seeds, jobs, out)
+    return _over_time("til-figure-6", ROLL_YAW, ROLL_YAW.table[3:5], "steering", making)
 
 
-def figure_7(seeds: int, jobs: int, out: Path) -> Result:
+def figure_7(making: Making) -> Result:
     """Error of the roll inertia over the noise."""
-    study = roll_yaw.STUDY
-    return _over_noise("til-figure-7", study, study.cases[2], "Jxx", seeds, jobs, out)
+    return _over_noise("til-figure-7", ROLL_YAW, ROLL_YAW.table[2], "Jxx", making)
 
 
-def figure_8(seeds: int, jobs: int, out: Path) -> Result:
+def figure_8(making: Making) -> Result:
     """Error of the yaw inertia over the noise."""
-    study = roll_yaw.STUDY
-    return _over_noise("til-figure-8", study, study.cases[2], "Jzz", seeds, jobs, out)
+    return _over_noise("til-figure-8", ROLL_YAW, ROLL_YAW.table[2], "Jzz", making)
 
 
-def figure_9(seeds: int, jobs: int, out: Path) -> Result:
+def figure_9(making: Making) -> Result:
     """Pitch inertia over time, sensors noisy, road known."""
-    return _over_time("til-figure-9", pitch.STUDY, [pitch.STUDY.cases[2]], "road", seeds, jobs, out)
+    return _over_time("til-figure-9", PITCH, PITCH.table[2:3], "road", making)
 
 
-def figure_10(seeds: int, jobs: int, out: Path) -> Result:
+def figure_10(making: Making) -> Result:
     """Error of the pitch inertia over the noise of the sensors."""
-    return _over_noise("til-figure-10", pitch.STUDY, pitch.STUDY.cases[2], "Jyy", seeds, jobs, out)
+    return _over_noise("til-figure-10", PITCH, PITCH.table[2], "Jyy", making)
 
 
-def figure_11(seeds: int, jobs: int, out: Path) -> Result:
+def figure_11(making: Making) -> Result:
     """Error of the pitch inertia over the noise of the known road, and that road."""
-    start = time.perf_counter()
-    study = pitch.STUDY
+    clock = Clock.started()
+    table = {0.0: 0.11, 0.1: 3.19}
     cases = [
-        replace(study.cases[1], name=f"noiseless, road noise {epsilon:g}", road_noise=epsilon)
+        replace(
+            PITCH.table[1],
+            name=f"noiseless, road noise {epsilon:g}",
+            road_noise=epsilon,
+            paper={("Jyy", "rms_pct"): table[epsilon]} if epsilon in table else {},
+        )
         for epsilon in ROAD_NOISE
     ]
-    paper = {0.0: 0.11, 0.1: 3.19}
-    errors = _errors(study, cases, "Jyy", seeds, jobs)
-    found = _rows(study, cases, "Jyy", errors, [paper.get(epsilon) for epsilon in ROAD_NOISE])
-    clean = real_drive(study.target, None)
-    noisy = noisy_drive(clean, cases[2], 0)
+    todo = runs(PITCH, making.seeds, making.duration, cases=cases)
+    found = [row for row in rows(todo, making.jobs, "til-figure-11") if row.metric == "rms_pct"]
+    noisy = cases[2].noisy_drive(0, making.duration)
     with pictures.figure(
-        out / "til-figure-11.png", rows=2, shared=False, title="Pitch inertia and a noisy road"
+        making.out / "til-figure-11.png", rows=2, shared=False, title="Pitch inertia, noisy road"
     ) as (above, below):
-        _draw_errors(above, ROAD_NOISE, errors, paper)
+        _draw_errors(above, ROAD_NOISE, PITCH, cases, "Jyy", making, table)
         above.set(xlabel="half width of the road's noise", ylabel="rms error of Jyy [%]")
         part = slice(20000, 21000)
-        for drive, label in ((noisy, "known to the twin"), (clean, "real")):
+        for drive, label in ((noisy, "known to the twin"), (_clean(cases[2], making), "real")):
             height = 100.0 * drive.channel("road_height_fl")
             below.plot(drive.time[part], height[part], lw=1, label=label)
         below.set(xlabel="time [s]", ylabel="road, front [cm]")
         below.legend(fontsize="small")
-    return _result("til-figure-11", found, seeds, start)
+    return clock.result("til-figure-11", making, found)
 
 
-def _run(study: Study, case: Case, estimator: str, seed: int, start: float) -> Run:
-    initial = tuple(start * variation()[name] for name in study.parameters)
-    return Run(
-        study=study.target, estimator=estimator, case=case, seed=seed, initial=initial
-    )  # fmt: skip
+def _clean(case: Case, making: Making) -> Drive:
+    assert isinstance(case.plant, CarPlant)
+    return case.plant.clean(making.duration)
 
 
-def _result(name: str, found: list[Row], seeds: int, start: float) -> Result:
-    return Result(
-        name=name, settings={"seeds": seeds}, seconds=time.perf_counter() - start, rows=found
+def _from(case: Case, experiment: Experiment, share: float) -> Case:
+    """The case with a share of the variation believed at the start."""
+    load, names = case.load(), experiment.quantities
+    words = ", ".join(f"{share * load[name]:.4g} {UNITS[name]}" for name in names)
+    return replace(
+        case,
+        name=f"{case.name}, from {words}",
+        initial=tuple((name, share * load[name]) for name in names),
+        paper={},
     )
 
 
 def _over_time(
-    name: str, study: Study, cases: Sequence[Case], drawn: str, seeds: int, jobs: int, out: Path
+    name: str, experiment: Experiment, cases: Sequence[Case], drawn: str, making: Making
 ) -> Result:
     """Convergence from several starts: rows over seeds, and a picture of the first seed."""
-    start = time.perf_counter()
-    todo = [
-        _run(study, case, "til", seed, share)
-        for case in cases
-        for share in STARTS
-        for seed in range(seeds)
-    ]
-    values = np.array(parallel(_convergence, todo, jobs, name))
-    values = values.reshape(len(cases), len(STARTS), seeds, len(study.parameters), 2)
-    found = []
-    for c, case in enumerate(cases):
-        for s, share in enumerate(STARTS):
-            for p, parameter in enumerate(study.parameters):
-                what = f"{case.name}, from {share * variation()[parameter]:.4g} {UNITS[parameter]}"
-                found += [
-                    Row.over_seeds(
-                        values[c, s, :, p, m], case=what, quantity=parameter, metric=metric,
-                        unit=unit, estimator="til",
-                    )
-                    for m, (metric, unit) in enumerate(
-                        (("time_to_10pct", "s"), ("worst_pct_last_half", "%"))
-                    )
-                ]  # fmt: skip
-    _draw_over_time(out / f"{name}.png", study, cases, drawn)
-    return _result(name, found, seeds, start)
+    clock = Clock.started()
+    til = {"til": experiment.estimators["til"]}
+    study = replace(experiment, metrics=_convergence, limit=None, estimators=til)
+    starts = [_from(case, experiment, share) for case in cases for share in STARTS]
+    found = rows(runs(study, making.seeds, making.duration, cases=starts), making.jobs, name)
+    _draw_over_time(making, name, study, cases, drawn)
+    return clock.result(name, making, found)
 
 
-def _convergence(run: Run) -> list[tuple[float, float]]:
-    drive, estimate = observe(run)
-    late = round(LAST * len(drive))
+def _convergence(trial: Trial) -> list[Score]:
+    _, drive, estimate = trial
+    late, load = round(LAST * len(drive)), trial.run.case.load()
     found = []
-    for name in find(run.study).parameters:
-        truth = variation()[name]
-        worst = 100.0 * np.abs(estimate[name][late:] - truth).max() / abs(truth)
-        found.append((settling_time(estimate[name], truth, drive.dt), float(worst)))
+    for name in trial.run.experiment.quantities:
+        worst = 100.0 * np.abs(estimate[name][late:] - load[name]).max() / abs(load[name])
+        found += [
+            Score(name, "time_to_10pct", "s", settling_time(estimate[name], load[name], drive.dt)),
+            Score(name, "worst_pct_last_half", "%", float(worst)),
+        ]
     return found
 
 
-def _draw_over_time(path: Path, study: Study, cases: Sequence[Case], drawn: str) -> None:
-    count = len(cases) * len(study.parameters)
+def _draw_over_time(
+    making: Making, name: str, study: Experiment, cases: Sequence[Case], drawn: str
+) -> None:
+    count = len(cases) * len(study.quantities)
     title = f"{study.name}, from several starts"
+    path: Path = making.out / f"{name}.png"
     with pictures.figure(path, rows=count + 1, title=title) as axes:
-        for case, name, axis in (
-            (case, name, axes[len(study.parameters) * c + p])
-            for c, case in enumerate(cases)
-            for p, name in enumerate(study.parameters)
-        ):
-            truth = variation()[name]
-            for share in STARTS:
-                drive, estimate = observe(_run(study, case, "til", 0, share))
-                axis.plot(
-                    drive.time[::EVERY], estimate[name][::EVERY], label=f"from {share * truth:.4g}"
-                )
-            axis.axhspan(0.9 * truth, 1.1 * truth, color="0.9", label="within 10 %")
-            axis.axhline(truth, color="k", lw=1, ls="--", label="truth")
-            axis.set(ylabel=f"{name} [{UNITS[name]}]", title=case.name)
-            axis.legend(ncols=3, fontsize="x-small")
-        _draw_drive(axes[-1], study, drawn)
+        for c, case in enumerate(cases):
+            todo = [
+                run
+                for share in STARTS
+                for run in runs(study, [0], making.duration, cases=[_from(case, study, share)])
+            ]
+            trials = [observe(run) for run in todo]
+            for p, parameter in enumerate(study.quantities):
+                axis, truth = axes[len(study.quantities) * c + p], case.load()[parameter]
+                for share, (_, drive, estimate) in zip(STARTS, trials, strict=True):
+                    axis.plot(
+                        drive.time[::EVERY],
+                        estimate[parameter][::EVERY],
+                        label=f"from {share * truth:.4g}",
+                    )
+                axis.axhspan(0.9 * truth, 1.1 * truth, color="0.9", label="within 10 %")
+                axis.axhline(truth, color="k", lw=1, ls="--", label="truth")
+                axis.set(ylabel=f"{parameter} [{UNITS[parameter]}]", title=case.name)
+                axis.legend(ncols=3, fontsize="x-small")
+        _draw_drive(axes[-1], _clean(cases[0], making), drawn)
 
 
-def _draw_drive(axis, study: Study, drawn: str) -> None:
-    drive = real_drive(study.target, None)
+def _draw_drive(axis, drive: Drive, drawn: str) -> None:
     values, label = {
         "vx": (3.6 * drive.truth["vx"], "speed [km/h]"),
         "steering": (np.degrees(drive.channel("steering_wheel_angle")), "hand wheel [deg]"),
@@ -188,65 +174,68 @@ def _draw_drive(axis, study: Study, drawn: str) -> None:
     axis.set(xlabel="time [s]", ylabel=label)
 
 
-def _errors(
-    study: Study, cases: Sequence[Case], parameter: str, seeds: int, jobs: int
-) -> dict[str, NDArray[np.float64]]:
-    """Of each estimator, rms errors [%] of shape (cases, seeds)."""
-    todo = [
-        _run(study, case, estimator, seed, 0.0)
-        for estimator in study.laws
-        for case in cases
-        for seed in range(seeds)
-    ]
-    column = study.parameters.index(parameter)
-    values = np.array(scores(todo, jobs, study.name))[:, column, 0]
-    return dict(zip(study.laws, values.reshape(len(study.laws), len(cases), seeds), strict=True))
-
-
-def _rows(
-    study: Study,
-    cases: Sequence[Case],
-    parameter: str,
-    errors: dict[str, NDArray[np.float64]],
-    paper: Sequence[float | None],
-) -> list[Row]:
-    law = study.laws["til"][study.parameters.index(parameter)]
-    return [
-        Row.over_seeds(
-            values, case=case.name, quantity=parameter, metric="rms_pct", unit="%",
-            estimator=estimator, paper=theirs, limit=limit(study, case, law, None),
-        )
-        for estimator, by_case in errors.items()
-        for case, values, theirs in zip(cases, by_case, paper, strict=True)
-    ]  # fmt: skip
-
-
 def _over_noise(
-    name: str, study: Study, case: Case, parameter: str, seeds: int, jobs: int, out: Path
+    name: str, experiment: Experiment, case: Case, parameter: str, making: Making
 ) -> Result:
     """The error over the noise of the sensors: rows, and a picture."""
-    start = time.perf_counter()
+    clock = Clock.started()
+    key = parameter, "rms_pct"
     cases = [
-        replace(case, snr=snr, name=case.name.replace("noisy", f"SNR {snr:g} dB", 1)) for snr in SNR
+        replace(
+            case,
+            snr=snr,
+            name=case.name.replace("noisy", f"SNR {snr:g} dB", 1),
+            paper={key: case.paper[key]} if snr == case.snr else {},
+        )
+        for snr in SNR
     ]
-    paper = {10.0: dict(case.paper)[parameter]}
-    errors = _errors(study, cases, parameter, seeds, jobs)
-    found = _rows(study, cases, parameter, errors, [paper.get(snr) for snr in SNR])
-    with pictures.figure(out / f"{name}.png", title=f"Error of {parameter} over noise") as axis:
-        _draw_errors(axis, SNR, errors, paper)
-        bounds = [row.limit for row in found[: len(SNR)]]
+    todo = runs(experiment, making.seeds, making.duration, cases=cases)
+    found = [
+        row
+        for row in rows(todo, making.jobs, name)
+        if (row.quantity, row.metric) == (parameter, "rms_pct")
+    ]
+    with pictures.figure(
+        making.out / f"{name}.png", title=f"Error of {parameter} over noise"
+    ) as axis:
+        paper = {case.snr: case.paper[key]}
+        _draw_errors(axis, SNR, experiment, cases, parameter, making, paper)
+        bounds = [row.limit for row in found if row.estimator == "til"]
         axis.plot(SNR, bounds, color="0.4", ls=":", label="Cramer-Rao bound of the rms")
         axis.set(xlabel="SNR [dB]", ylabel=f"rms error of {parameter} [%]")
         axis.legend(fontsize="small")
-    return _result(name, found, seeds, start)
+    return clock.result(name, making, found)
+
+
+def _errors(
+    experiment: Experiment, case: Case, estimator: str, parameter: str, making: Making
+) -> NDArray[np.float64]:
+    """(seeds,) rms errors [%]; one seed stands for all where nothing is random."""
+    todo = runs(experiment, making.seeds, making.duration, cases=[case], estimators=[estimator])
+    key = parameter, "rms_pct"
+    found = [
+        score.value
+        for one in scores(todo, making.jobs, experiment.name)
+        for score in one
+        if (score.quantity, score.metric) == key
+    ]
+    return np.broadcast_to(found, len(making.seeds)) if len(found) == 1 else np.array(found)
 
 
 def _draw_errors(
-    axis, x: Sequence[float], errors: dict[str, NDArray[np.float64]], paper: dict[float, float]
+    axis,
+    x: Sequence[float],
+    experiment: Experiment,
+    cases: Sequence[Case],
+    parameter: str,
+    making: Making,
+    paper: dict[float, float],
 ) -> None:
-    for estimator, values in errors.items():
+    of = partial(_errors, parameter=parameter, making=making)
+    for estimator in experiment.estimators:
+        values = np.array([of(experiment, case, estimator) for case in cases])
         pictures.spread(axis, x, values, label=estimator)
     axis.plot(*zip(*paper.items(), strict=True), "kx", label="the paper's tables")
-    axis.axhline(LIMIT, color="k", lw=1, ls="--", label="what the paper accepts")
+    axis.axhline(ACCEPTED, color="k", lw=1, ls="--", label="what the paper accepts")
     axis.set(yscale="log")
     axis.legend(fontsize="small")

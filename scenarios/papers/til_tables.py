@@ -1,21 +1,30 @@
-"""TiL Tables 3 to 6: the paper's figures beside ours."""
+"""TiL Tables 3 to 6 and 8, and tables of all real vehicles: the paper's figures beside ours."""
 
-import time
-from pathlib import Path
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
+from estimators.entry import Given
+from estimators.joint.observer import JointSettings
 from scenarios import mass, pitch, roll_yaw
+from scenarios.experiment import gains_file, joint, laws, sideslip_and_mass
+from scenarios.experiment.engine import rows, runs
+from scenarios.experiment.experiment import INFINITE, Case, Experiment, Recipe, Run
 from scenarios.experiment.result import Result, Row
-from scenarios.experiment.study import REAL, TWIN, Study, rows
-from scenarios.papers import joint_tables
-from twin import Vehicle
+from scenarios.experiment.sideslip_and_mass import BOUNDS, CASE, COMMONROAD, TABLE_8, TWIN
+from scenarios.papers.reproduction import Clock, Making
+from scenarios.plants.mismatch import MISMATCHES
+from twin import LOAD, Drive, Vehicle
 
 
-def table_3(seeds: int, jobs: int, out: Path) -> Result:
+def table_3(making: Making) -> Result:
     """Our loaded chassis beside the paper's, which no point masses of Table 2 can give."""
-    start = time.perf_counter()
-    real, nominal = Vehicle.load(REAL).chassis(), Vehicle.load(TWIN).chassis()
+    clock = Clock.started()
+    real, nominal = (Vehicle.load(car).chassis() for car in (joint.REAL, joint.TWIN))
     # d is measured from the front axle and the road: where the chassis frame stands
     place = np.array([-1.25, 0.0, 0.644])
     quantities = (
@@ -27,43 +36,163 @@ def table_3(seeds: int, jobs: int, out: Path) -> Result:
         ("cm_y", "cm", 100.0 * (real.cm + place)[1], 1.6),
         ("cm_z", "cm", 100.0 * (real.cm + place)[2], 68.4),
     )
-    return Result(
-        name="til-table-3",
-        settings={"nominal_mass": nominal.mass},
-        seconds=time.perf_counter() - start,
-        rows=[
-            Row.over_seeds(
-                [value], case="loaded chassis", quantity=name, metric="value", unit=unit,
-                estimator="model", paper=paper,
-            )
-            for name, unit, value, paper in quantities
-        ],
-    )  # fmt: skip
+    found = [
+        Row.over_seeds(
+            [value], case="loaded chassis", quantity=name, metric="value", unit=unit,
+            estimator="model", paper=paper,
+        )
+        for name, unit, value, paper in quantities
+    ]  # fmt: skip
+    return clock.result("til-table-3", making, found, nominal_mass=nominal.mass)
 
 
-def table_4(seeds: int, jobs: int, out: Path) -> Result:
+def table_4(making: Making) -> Result:
     """Mass."""
-    return _table("til-table-4", mass.STUDY, seeds, jobs)
+    return _table("til-table-4", mass.EXPERIMENT, making)
 
 
-def table_5(seeds: int, jobs: int, out: Path) -> Result:
+def table_5(making: Making) -> Result:
     """Roll and yaw inertia, also by the joint observer."""
-    return _table("til-table-5", roll_yaw.STUDY, seeds, jobs, joint=True)
+    return _table("til-table-5", roll_yaw.EXPERIMENT, making, joint=True)
 
 
-def table_6(seeds: int, jobs: int, out: Path) -> Result:
+def table_6(making: Making) -> Result:
     """Pitch inertia, also by the joint observer."""
-    return _table("til-table-6", pitch.STUDY, seeds, jobs, joint=True)
+    return _table("til-table-6", pitch.EXPERIMENT, making, joint=True)
 
 
-def _table(name: str, study: Study, seeds: int, jobs: int, *, joint: bool = False) -> Result:
-    start = time.perf_counter()
-    found = rows(study, study.cases, range(seeds), jobs)
+def _table(name: str, experiment: Experiment, making: Making, *, joint: bool = False) -> Result:
+    clock = Clock.started()
+    todo = runs(experiment, making.seeds, making.duration, cases=experiment.table)
     if joint:
-        found += joint_tables.rows(study, study.cases, range(seeds), jobs)
-    return Result(
-        name=name,
-        settings={"seeds": seeds},
-        seconds=time.perf_counter() - start,
-        rows=found,
+        white = [c for c in experiment.table if c.snr < INFINITE and c.noise_on == "rates"]
+        other = replace(experiment, estimators={"joint": JOINT}, limit=None)
+        todo += runs(other, making.seeds, making.duration, cases=white)
+    return clock.result(name, making, rows(todo, making.jobs, name))
+
+
+def _joint_of_a_table(run: Run, drive: Drive, given: Given) -> Given:
+    """The parameters of the load that the case does not tell; of sensors and tyres all is known."""
+    del drive
+    names = tuple(name for name in LOAD if name not in run.case.knows)
+    return replace(
+        given, parameters=names, settings=JointSettings(parameters=names, sensor_errors=())
     )
+
+
+JOINT = Recipe(estimator="joint", complete=_joint_of_a_table)
+
+
+def table_8(making: Making) -> Result:
+    """Bounds and optima of the gains, ours beside the paper's."""
+    clock = Clock.started()
+    found = []
+    for estimator, bounds in BOUNDS.items():
+        own = sideslip_and_mass.gains_of(TWIN, estimator)
+        for name, ends in bounds.items():
+            paper = TABLE_8.get(estimator, {}).get(name)
+            values = {"lower bound": ends[0], "upper bound": ends[1], "optimised": own[name]}
+            found += [
+                Row.over_seeds(
+                    [value], case=case, quantity=name, metric="gain",
+                    unit=GAIN_UNITS.get(name, "1/s"), estimator=estimator,
+                    paper=paper if case == "optimised" else None,
+                )
+                for case, value in values.items()
+            ]  # fmt: skip
+    return clock.result("til-table-8", making, found, made={name: _made(name) for name in BOUNDS})
+
+
+GAIN_UNITS = {
+    "ax_vx": "1",
+    "ay_vy": "1",
+    "mass": "kg/(m/s)",
+    "yaw_rate_vy": "m/s",
+    "noise_density": "m/s2/Hz^0.5",
+    "drift": "kg/s^0.5",
+}
+
+
+def _made(estimator: str) -> Any:
+    text = (gains_file.FOLDER / f"{TWIN}-{estimator}.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)["made"]
+
+
+# Errors of one force at a time: what they do to the mass does not average out
+SINGLE = ("drive-5", "drive+5", "brake-5", "brake+5", "cornering_stiffness+10", "drag+10", "delay")
+
+
+def joint_table(making: Making) -> Result:
+    """Sideslip, mass and axle forces of every observer on every real vehicle."""
+    clock = Clock.started()
+    experiment = sideslip_and_mass.experiment("laps")
+    forces = replace(
+        experiment, estimators={**experiment.estimators, **sideslip_and_mass.AXLE_FORCES}
+    )
+    alone = replace(experiment, estimators={"til": experiment.estimators["til"]})
+    both = ("laps", "lane-change")
+    others = find_spec("vehiclemodels") is not None
+    case = sideslip_and_mass.case
+    todo: list[tuple[Experiment, Sequence[Case]]] = [
+        (experiment, [case("same", drive) for drive in both]),
+        (forces, [case(CASE, drive) for drive in both]),
+        (alone, [case(vehicle, "laps") for vehicle in SINGLE]),
+        *([(experiment, [case(COMMONROAD, drive) for drive in both])] if others else []),
+    ]
+    found = rows(
+        [run for e, cases in todo for run in runs(e, making.seeds, making.duration, cases=cases)],
+        making.jobs,
+        "til-joint-table",
+    )
+    vehicles = {name: MISMATCHES[name].summary for name in ("same", CASE, *SINGLE)}
+    vehicles[COMMONROAD] = (
+        "BMW 320i of commonroad-vehicle-models, below 0.6 g"
+        if others
+        else "left out: commonroad-vehicle-models is not installed"
+    )
+    settings = {"snr": sideslip_and_mass.SNR, "real_vehicles": vehicles}
+    return clock.result("til-joint-table", making, found, **settings)
+
+
+def _all_parameters(run: Run, drive: Drive, given: Given) -> Given:
+    return replace(given, parameters=joint.NAMES)
+
+
+PEERS = {
+    "staged": Recipe(estimator="staged", laws=laws.ALL_LAWS),
+    "til-paper": Recipe(estimator="til-paper", laws=laws.ALL_PAPER_LAWS),
+    **{
+        name: Recipe(
+            estimator=name,
+            complete=lambda run, drive, given: replace(given, parameters=joint.NAMES),
+        )
+        for name in ("unscented", "least-squares")
+    },
+}
+COMPARED = (("mixed", "same"), ("mixed", "all-scales"))  # by all peers
+BOUNDED = (("mixed", "same"), ("hard", "same"))
+OTHERS = (
+    ("hard", "same"),
+    ("straight", "same"),
+    ("straight", "imu-bias"),
+    ("urban", "all-scales"),
+    (joint.LOAD_CHANGE, "same"),
+)
+
+
+def joint_all(making: Making) -> Result:
+    """The joint observer against every real vehicle, on all drives, beside its peers."""
+    clock = Clock.started()
+    todo = []
+    for drive, mismatch in (*(("mixed", name) for name in MISMATCHES), *OTHERS):
+        # the other peers look at 37 twins, or through the whole drive many times over
+        peers = dict(PEERS) if (drive, mismatch) in COMPARED else {"staged": PEERS["staged"]}
+        if drive == joint.LOAD_CHANGE:
+            peers = {}
+        experiment = joint.experiment(drive, {**joint.RECIPES, **peers})
+        if (drive, mismatch) in BOUNDED:
+            experiment = replace(experiment, limit=joint.bound)
+        case = joint.case(drive, mismatch)
+        todo += runs(experiment, making.seeds, making.duration, cases=[case])
+    found = rows(todo, making.jobs, "til-joint-all")
+    return clock.result("til-joint-all", making, found, snr=joint.SNR)

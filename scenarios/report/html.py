@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from scenarios.experiment.result import Result, replacing
+from scenarios.experiment.result import Result, cell, replacing
 
 TEMPLATE = Path(__file__).with_name("report.html")
 
@@ -85,14 +85,9 @@ def _section(section: Section) -> str:
 
 
 def _table(result: Result) -> str:
-    """The table as it is printed; its rule of dashes tells the columns apart."""
-    heading, rule, *lines = result.table().splitlines()
-    spans, start = [], 0
-    for dashes in rule.split("  "):
-        spans.append(slice(start, start + len(dashes)))
-        start += len(dashes) + len("  ")
-    names = [heading[span].strip() for span in spans]
-    numeric = [not all(isinstance(getattr(row, n), str) for row in result.rows) for n in names]
+    """The rows of the result, numbers to the right."""
+    columns = result.columns()
+    numeric = [not all(isinstance(value, str) for value in values) for values in columns.values()]
 
     def line(tag: str, cells: Sequence[str]) -> str:
         marked = (
@@ -101,10 +96,10 @@ def _table(result: Result) -> str:
         )
         return f"<tr>{''.join(marked)}</tr>"
 
-    body = (line("td", [text[span].strip() for span in spans]) for text in lines)
-    rows = "\n".join(body)
+    shown = zip(*(map(cell, values) for values in columns.values()), strict=True)
+    rows = "\n".join(line("td", cells) for cells in shown)
     return (
-        f'<div class="wide"><table>\n<thead>{line("th", names)}</thead>\n'
+        f'<div class="wide"><table>\n<thead>{line("th", list(columns))}</thead>\n'
         f"<tbody>\n{rows}\n</tbody>\n</table></div>"
     )
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from estimators.base import Estimate
 from estimators.til import state_and_mass
-from scenarios.experiment.state_study import Belief, Run, observe
-from scenarios.plants.mismatch import MISMATCHES, real_vehicle
+from scenarios.experiment.experiment import Trial
+from scenarios.experiment.metrics import mass_error
 from scenarios.timeline import scene as timeline_3d
 from scenarios.timeline.scene import Motion
 from scenarios.timeline.states import Colour, Lane, lanes_view, send_lane
@@ -31,7 +31,7 @@ from scenarios.timeline.timeline import (
     recording_to,
     send_plot,
 )
-from twin import STATES, Drive, TwinError, Vehicle
+from twin import STATES, Drive, Vehicle
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -47,35 +47,31 @@ CORRECTED = "mass is corrected"
 YAW, VX, VY = STATES.index("yaw"), STATES.index("vx"), STATES.index("vy")
 
 
-def write(path: Path, runs: Sequence[Run], title: str) -> None:
-    """Writes the first run of each estimator of `COLOURS` as an .rrd file, whole or not at all.
+def write(path: Path, trials: Sequence[Trial], vehicle: Vehicle, title: str) -> None:
+    """Writes trials on one drive as an .rrd file, whole or not at all.
 
     Args:
         path: the file.
-        runs: of one real vehicle.
+        trials: of estimators of `COLOURS`, the default observer first.
+        vehicle: the real one, which is drawn.
         title: what the viewer calls the recording.
 
     Raises:
-        TwinError: the file cannot be written, or there is no run of the default observer.
+        TwinError: the file cannot be written.
     """
-    first = {run.estimator: run for run in reversed(runs) if run.estimator in COLOURS}
-    seen = {name: observe(first[name]) for name in COLOURS if name in first}
-    if "til" not in seen or seen["til"][1].estimate is None:
-        raise TwinError(f"{path}: a timeline needs a run of til")
-    drive, estimate = seen["til"][0], seen["til"][1].estimate
-    plots = _plots(drive, {name: found for name, (_, found) in seen.items()})
+    drive, estimate = trials[0].drive, trials[0].estimate
+    plots = _plots(trials)
     lanes = _lanes(drive, estimate)
     moved = timeline_3d.motion(drive, estimate, frames(drive.time))
-    run = first["til"]
-    vehicle = real_vehicle(Vehicle.load("sports_car"), MISMATCHES[run.case])
+    model = vehicle.compile()
     with recording_to(path, _blueprint(plots, lanes, moved), title, drive.settings) as recording:
         import rerun as rr
 
-        timeline_3d.log_car(recording, vehicle.compile(), moved)
-        ghost = timeline_3d.poses(vehicle.compile(), _ghost(moved, estimate, frames(drive.time)))
+        timeline_3d.log_car(recording, model, moved)
+        ghost = timeline_3d.poses(model, _ghost(moved, estimate, frames(drive.time)))
         timeline_3d.log_bodies(
             recording,
-            vehicle.compile(),
+            model,
             [rr.TimeColumn("time", duration=moved.time)],
             ghost.positions,
             ghost.quaternions,
@@ -121,26 +117,31 @@ def _lanes(drive: Drive, estimate: Estimate) -> list[Lane]:
     ]
 
 
-def _plots(drive: Drive, beliefs: dict[str, Belief]) -> list[Plot]:
+def _plots(trials: Sequence[Trial]) -> list[Plot]:
     """Sideslip, its error, the error of the mass and the speed."""
+    drive = trials[0].drive
     truth = np.degrees(drive.truth["sideslip"])
 
-    def lines(values: Callable[[Belief], Array], true: Array) -> list[Line]:
+    def lines(values: Callable[[Trial], Array], true: Array) -> list[Line]:
         found = [
-            Line(name.replace("-", "_"), name, values(belief), COLOURS[name], 2.5)
-            for name, belief in beliefs.items()
+            Line(name.replace("-", "_"), name, values(trial), COLOURS[name], 2.5)
+            for trial in trials
+            for name in (trial.run.estimator,)
         ]
         return [*found, Line("truth", "truth", true, TRUTH, 1.2)]
 
+    def sideslip(trial: Trial) -> Array:
+        return np.degrees(trial.estimate.sideslip)
+
     zero = np.zeros(len(drive))
     return [
-        Plot("sideslip", "sideslip [deg]", lines(lambda b: np.degrees(b.sideslip), truth)),
+        Plot("sideslip", "sideslip [deg]", lines(sideslip, truth)),
         Plot(
             "sideslip_error",
             "error of the sideslip [deg]",
-            lines(lambda b: np.degrees(b.sideslip) - truth, zero),
+            lines(lambda trial: sideslip(trial) - truth, zero),
         ),
-        Plot("mass", "error of the mass [kg]", lines(lambda b: b.mass, zero)),
+        Plot("mass", "error of the mass [kg]", lines(mass_error, zero)),
         Plot(
             "speed",
             "speed [km/h]",

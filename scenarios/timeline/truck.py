@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import models
 from estimators.base import Estimate
-from scenarios.papers.truck_score import UNITS
+from scenarios.experiment.truck import NOMINAL, UNITS
 from scenarios.timeline import scene as timeline_3d
 from scenarios.timeline import timeline as tl
 from twin import Drive
@@ -62,12 +62,13 @@ def write_truck_timeline(
 def _parameter_plot(name: str, drive: Drive, estimates: Mapping[str, Estimate]) -> tl.Plot:
     """Truth, the first estimate in its band, the second."""
     (first, found), *others = estimates.items()
-    values, band = found.absolute(name), SIGMAS * found.sd_of(name)
+    nominal = NOMINAL[name]
+    values, band = nominal + found[name], SIGMAS * found.sd_of(name)
     lines = [
         tl.Line("upper", f"+{SIGMAS:g} standard deviations", values + band, tl.BAND_COLOUR, 1.0),
         tl.Line("lower", f"-{SIGMAS:g} standard deviations", values - band, tl.BAND_COLOUR, 1.0),
         tl.Line(first, first, values, tl.TWIN, 2.5),
-        *(tl.Line(other, other, e.absolute(name), _SECOND, 1.5) for other, e in others),
+        *(tl.Line(other, other, nominal + e[name], _SECOND, 1.5) for other, e in others),
         tl.Line("truth", "truth", drive.truth[name], tl.TRUTH, 2.0),
     ]
     return tl.Plot(f"parameters/{name}", f"{name} [{UNITS[name]}]", lines)

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.experiment.experiment import Gain
 from scenarios.experiment.progress import bar, parallel
 from scenarios.experiment.result import Row
 from twin import TwinError
@@ -24,30 +25,6 @@ from twin import TwinError
 BATCH = 4
 SOBOL = 12  # points before the first surrogate, today's among them
 Point = tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gain:
-    """One number that is chosen.
-
-    Attributes:
-        name: of the gain.
-        low, high: bounds.
-        today: what it is now; tried first, pulled into the bounds.
-    """
-
-    name: str
-    low: float
-    high: float
-    today: float
-
-    def __post_init__(self) -> None:
-        """Checks the bounds."""
-        if not 0.0 < self.low < self.high < math.inf:
-            raise TwinError(
-                f"tune: bounds of {self.name} are {self.low:g} to {self.high:g}; allowed: "
-                "0 < lower < upper, finite"
-            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

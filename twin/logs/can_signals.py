@@ -115,7 +115,8 @@ def decode(
         there = _selected(signal, message, raw)
         whole = length * 8 > signal.bits.max()
         short |= there & ~whole
-        number = raw[signal.name].astype(np.float64) * signal.scale + signal.offset
+        with np.errstate(invalid="ignore", over="ignore"):  # of payloads that are no number
+            number = raw[signal.name].astype(np.float64) * signal.scale + signal.offset
         number[~(there & whole) | ~np.isfinite(number)] = np.nan
         values[signal.name] = number
     return values, int(short.sum())

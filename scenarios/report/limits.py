@@ -1,4 +1,4 @@
-"""What the drive of a scenario can tell of the load at all: `til limits`.
+"""How well a drive lets the load be estimated at all: `til limits`.
 
 The Cramer-Rao bound of `estimators.identifiability.cramer_rao`, taken at the real vehicle's load,
 of which an estimator knows all the other parameters ("single") or none of them ("joint").
@@ -7,18 +7,25 @@ The bound of each channel alone counts only samples of a car that moves. Open-lo
 mass come to a stop at another instant, and that jump is not what a law on one signal looks at.
 """
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.identifiability.cramer_rao import CramerRaoBound, cramer_rao, sensitivities
-from estimators.til.law import ParameterLaw
-from scenarios.cli.catalogue import Scenario, Settings
+from estimators.identifiability.cramer_rao import CramerRaoBound, cramer_rao
+from scenarios.experiment.bounds import (
+    WHEEL_SPEEDS,
+    is_moving,
+    percent,
+    sensitivities_at,
+    using,
+)
+from scenarios.experiment.experiment import CarPlant, Experiment
 from scenarios.experiment.progress import progress
 from scenarios.experiment.result import Result, Row
-from twin import OUTPUTS, Drive, Twin, TwinError, Vehicle, noise_sd
+from twin import OUTPUTS, TwinError, noise_sd
 
 Array = NDArray[np.float64]
 
@@ -27,105 +34,72 @@ UNITS = {
     **dict.fromkeys(("cm_x", "cm_y", "cm_z"), "m"),
     **dict.fromkeys(("Jxx", "Jyy", "Jzz"), "kg m2"),
 }
-IMU, WHEEL_SPEEDS = OUTPUTS[:6], OUTPUTS[6:]
+IMU = OUTPUTS[:6]
 TOGETHER = {"all channels": OUTPUTS, "IMU": IMU}
 ALONE = {**{name: (name,) for name in IMU}, "wheel_speed": WHEEL_SPEEDS}
 MOVING = 3.0  # [rad/s] of the wheels, 1 m/s
 
 
-def run(name: str, scenario: Scenario, settings: Settings) -> tuple[Result, str]:
+def limits_of(
+    experiment: Experiment, snr: float | None = None, duration: float | None = None
+) -> tuple[Result, str]:
     """The bounds as rows, and as text for people.
 
+    Args:
+        experiment: whose first case is looked at.
+        snr: of the sensors [dB]; None: the case's.
+        duration: of the drive [s]; None: all of it.
+
     Raises:
-        TwinError: there is no noise, and so no limit.
+        TwinError: there is no noise and so no bound, or no car with a constant load.
     """
-    if settings.snr == float("inf"):
+    case = experiment.at(snr)[0]
+    if case.snr == math.inf:
         raise TwinError(
             "limits: snr is inf; allowed: a number of dB (without noise nothing limits)"
         )
+    if not isinstance(case.plant, CarPlant):
+        raise TwinError(f"limits: {experiment.name} has none; allowed: a simulated car")
     start = time.perf_counter()
-    drive, variation = scenario.drive(settings), scenario.variation()
-    sd = noise_sd(drive.measurements, settings.snr, drive.output_names)
+    drive, variation = case.plant.clean(duration), case.variation()
+    if np.ptp(drive.truth["mass"]) > 0.0:
+        raise TwinError(f"limits: {experiment.name} has none; allowed: a car with a constant load")
+    sd = noise_sd(drive.measurements, case.snr, drive.output_names)
     sensitivity = np.concatenate(
         [
-            sensitivity_at_truth(scenario.vehicle, drive, [parameter], variation)
+            sensitivities_at(case, drive, [parameter])
             for parameter in progress(UNITS, "sensitivities", len(UNITS))
         ]
     )
+    names = tuple(UNITS)
     together = {
-        case: cramer_rao(tuple(UNITS), sensitivity, using(sd, channels))
-        for case, channels in TOGETHER.items()
+        group: cramer_rao(names, sensitivity, using(sd, channels))
+        for group, channels in TOGETHER.items()
     }
     moving = sensitivity[:, is_moving(drive, MOVING)]
     alone = {
-        channel: cramer_rao(tuple(UNITS), moving, using(sd, channels))
+        channel: cramer_rao(names, moving, using(sd, channels))
         for channel, channels in ALONE.items()
     }
     rows = [
-        row for case, bound in together.items() for row in _rows_together(case, bound, variation)
+        row for group, bound in together.items() for row in _rows_together(group, bound, variation)
     ]
     for channel, bound in alone.items():
         rows += _rows(f"{channel} alone, moving", "limit_single", bound, bound.single, variation)
     result = Result(
-        name=f"limits of {name}",
-        settings={"snr": settings.snr, "duration": settings.duration},
+        name=f"limits of {experiment.name}",
+        settings={"snr": case.snr, "duration": duration},
         seconds=time.perf_counter() - start,
         rows=rows,
     )
-    used = f"{len(drive) * drive.dt:g} s with noise of {settings.snr:g} dB"
+    used = f"{len(drive) * drive.dt:g} s with noise of {case.snr:g} dB"
     return result, "\n\n".join(
         [
             f"{used}; exact model, known start, no bias",
-            *(_text(case, bound, variation) for case, bound in together.items()),
+            *(_text(group, bound, variation) for group, bound in together.items()),
             f"each channel alone, of a moving car: single [%]\n{_by_channel(alone, variation)}",
         ]
     )
-
-
-def sensitivity_at_truth(
-    vehicle: str, drive: Drive, parameters: Sequence[str], variation: Mapping[str, float]
-) -> Array:
-    """(p, N, 10) what parameters change in the outputs, around the real vehicle's load."""
-    twin = Twin(Vehicle.load(vehicle))
-    speed = float(drive.truth["vx"][0])
-    return sensitivities(twin, drive, parameters, variation, speed=speed)
-
-
-def using(sd: Array, channels: Sequence[str]) -> Array:
-    """The (10,) standard deviations, with NaN for all other channels."""
-    return np.where(np.isin(OUTPUTS, channels), sd, np.nan)
-
-
-def is_moving(drive: Drive, least: float) -> NDArray[np.bool_]:
-    """(N,) whether the wheels turn at least so fast [rad/s], in the mean; zero: always."""
-    if least == 0.0:
-        return np.ones(len(drive), dtype=np.bool_)
-    return np.mean([drive.channel(name) for name in WHEEL_SPEEDS], axis=0) >= least
-
-
-def law_limit(law: ParameterLaw, sensitivity: Array, drive: Drive, sd: Array) -> float:
-    """The bound on one parameter from what its law uses of a drive.
-
-    That is one signal, of a car that moves, with an offset if the law fits one along.
-
-    Args:
-        law: of the parameter.
-        sensitivity: (1, N, 10) to it.
-        drive: without noise.
-        sd: (10,) of the noise.
-    """
-    bound = cramer_rao(
-        [law.parameter],
-        sensitivity[:, is_moving(drive, law.least_wheel_speed)],
-        using(sd, [law.output]),
-        free_offsets=law.offset_sd > 0.0,
-    )
-    return float(bound.single[0])
-
-
-def percent(sd: float, variation: float) -> float:
-    """A standard deviation in % of what is to be found; NaN where nothing is."""
-    return 100.0 * sd / abs(variation) if variation else float("nan")
 
 
 def _rows(
@@ -162,7 +136,7 @@ def _text(case: str, bound: CramerRaoBound, variation: Mapping[str, float]) -> s
         f"{case}: correlation of the joint errors\n{_correlation(bound)}",
     ]
     if bound.unidentifiable:
-        parts.append(f"{case}: not told, or not apart: {', '.join(bound.unidentifiable)}")
+        parts.append(f"{case}: not identifiable, or not apart: {', '.join(bound.unidentifiable)}")
     return "\n\n".join(parts)
 
 

@@ -4,20 +4,26 @@ Those that ship with the project lie in models/gains, named CAR-ESTIMATOR.toml.
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import models
+from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.result import replacing, versions
-from scenarios.tuning.tune import Tuned
 from twin import TwinError
 
 FOLDER = Path(models.__file__).parent / "gains"
 
 
 def write(
-    path: Path, *, vehicle: str, estimator: str, tuned: Tuned, made: Mapping[str, Any]
+    path: Path,
+    *,
+    vehicle: str,
+    estimator: str,
+    gains: Mapping[str, float],
+    predicted: Mapping[str, float],
+    made: Mapping[str, Any],
 ) -> None:
     """Writes what a tuning found, whole or not at all.
 
@@ -25,22 +31,18 @@ def write(
         path: of the TOML file.
         vehicle: name of the twin's car.
         estimator: whose gains.
-        tuned: the search's result.
-        made: what else made it: settings, seeds, the cost.
+        gains: the best point tried.
+        predicted: the point predicted best.
+        made: how it was made: evaluations, settings, seeds, the cost.
     """
     import tomli_w
 
     content = {
         "vehicle": vehicle,
         "estimator": estimator,
-        "gains": tuned.evaluated,
-        "predicted": tuned.predicted,
-        "made": {
-            **made,
-            "evaluations": tuned.evaluations,
-            "cost": tuned.cost,
-            "versions": versions(),
-        },
+        "gains": dict(gains),
+        "predicted": dict(predicted),
+        "made": {**made, "versions": versions()},
     }
     with replacing(path) as partial:
         partial.write_bytes(tomli_w.dumps(content).encode())
@@ -81,3 +83,20 @@ def read(path: Path, *, vehicle: str, estimator: str, names: Iterable[str]) -> d
             raise TwinError(f"{path}: gains.{name} is {value}; allowed: a finite number, 0 or more")
         found[name] = float(value)
     return found
+
+
+def of_run(
+    path: Path, experiment: Experiment, estimators: Sequence[str] = ()
+) -> tuple[tuple[str, float], ...]:
+    """The gains of a file for the first estimator of `til run`.
+
+    Raises:
+        TwinError: that has no gains, or the file is broken, or for another car or estimator.
+    """
+    name = next(iter(estimators or experiment.estimators))
+    own = experiment.estimators.get(name)
+    if own is None or own.tunable is None:
+        raise TwinError(f"--gains: {name} on {experiment.name} takes none")
+    car = experiment.cases[0].twin
+    names = [gain.name for gain in own.tunable(car)]
+    return tuple(read(path, vehicle=car, estimator=name, names=names).items())

@@ -1,4 +1,4 @@
-"""Sideslip and mass together: what the issue of TiL Section 5 promises, on short drives."""
+"""Sideslip and mass together: what TiL Section 5 promises, on short drives."""
 
 import dataclasses
 import math
@@ -6,44 +6,76 @@ import math
 import numpy as np
 import pytest
 
+from estimators.registry import make
 from estimators.til import state_and_mass
 from estimators.til.law import advance_law, compile_laws
 from estimators.til.observer import Observer
-from scenarios.cli.catalogue import Settings
-from scenarios.experiment import state_study
-from scenarios.experiment.state_study import (
-    Run,
-    gains_of,
-    make_observer,
-    noisy_drive,
-    observe,
-    score,
-)
-from scenarios.laps import LAPS
+from scenarios import laps
+from scenarios.experiment import sideslip_and_mass
+from scenarios.experiment.engine import given, observe, run_experiment, runs, score
+from scenarios.experiment.experiment import Run
+from scenarios.experiment.gains_file import of_run
+from scenarios.experiment.metrics import mass_error
+from scenarios.experiment.sideslip_and_mass import case, gains_of
 from twin import FORCES, OUTPUTS, TwinError
 
 INFINITE = math.inf
 SECONDS = 16.0
-SAME = Run(case="same", drive="laps", estimator="til", snr=INFINITE, duration=SECONDS)
-MISMATCHED = dataclasses.replace(SAME, case="mismatched")
+EXPERIMENT = dataclasses.replace(
+    laps.EXPERIMENT,
+    estimators={**sideslip_and_mass.RECIPES, **sideslip_and_mass.AXLE_FORCES},
+)
 
 
-def degrees(drive, belief, part=slice(None)):
-    error = np.degrees(belief.sideslip - drive.truth["sideslip"])[part]
+def quiet(vehicle, **changes):
+    return dataclasses.replace(case(vehicle, "laps"), snr=INFINITE, **changes)
+
+
+SAME = Run(experiment=EXPERIMENT, case=quiet("same"), estimator="til", duration=SECONDS)
+MISMATCHED = dataclasses.replace(SAME, case=quiet("mismatched"))
+
+
+def noisy_drive(run):
+    return run.case.noisy_drive(run.seed, run.duration)
+
+
+def make_observer(run, **changes):
+    own = dataclasses.replace(given(run, noisy_drive(run)), **changes)
+    return make("til", own)
+
+
+def figure(run, quantity, metric):
+    return next(s.value for s in score(run)[0] if (s.quantity, s.metric) == (quantity, metric))
+
+
+def sideslip(run):
+    return figure(run, "sideslip", "rmse")
+
+
+def degrees(drive, estimate, part=slice(None)):
+    error = np.degrees(estimate.sideslip - drive.truth["sideslip"])[part]
     return math.sqrt(np.mean(error**2))
 
 
 def test_right_twin_finds_sideslip_and_mass():
-    drive, belief = observe(SAME)
-    assert belief.mass[0] == pytest.approx(-350.0, abs=1.0)
+    trial = observe(SAME)
+    _, drive, estimate = trial
+    mass = mass_error(trial)
+    assert mass[0] == pytest.approx(-350.0, abs=1.0)
     late = slice(round(0.5 * len(drive)), None)
-    assert degrees(drive, belief, late) < 0.01
-    assert abs(belief.mass[-1]) < 1.0
+    assert degrees(drive, estimate, late) < 0.01
+    assert abs(mass[-1]) < 1.0
 
 
 def test_starts_on_either_side_end_together():
     ends = [
-        observe(dataclasses.replace(MISMATCHED, start=start))[1].mass[-1]
+        mass_error(
+            observe(
+                dataclasses.replace(
+                    MISMATCHED, case=quiet("mismatched", initial=(("mass", start),))
+                )
+            )
+        )[-1]
         for start in (-350.0, 0.0, 350.0)
     ]
     assert np.ptp(ends) < 5.0
@@ -51,11 +83,16 @@ def test_starts_on_either_side_end_together():
 
 
 def test_corrections_at_100_hz_do_what_those_at_1_khz_do():
-    found = [observe(dataclasses.replace(MISMATCHED, every=every)) for every in (1, 10)]
+    drive = noisy_drive(MISMATCHED)
+    found = []
+    for every in (1, 10):
+        observer = make_observer(MISMATCHED, every=every)
+        observer.reset(float(drive.truth["vx"][0]), {"mass": -350.0})
+        found.append(observer.run(drive))
     late = slice(round(0.5 * SECONDS / 1e-3), None)
-    fast, slow = (degrees(drive, belief, late) for drive, belief in found)
+    fast, slow = (degrees(drive, estimate, late) for estimate in found)
     assert slow == pytest.approx(fast, rel=0.1)
-    fast, slow = (belief.mass[-1] for _, belief in found)
+    fast, slow = (estimate["mass"][-1] for estimate in found)
     assert slow == pytest.approx(fast, abs=0.01 * 350.0)
 
 
@@ -105,7 +142,7 @@ def test_compensation_brings_back_the_mass_that_wheel_speeds_hide():
 
 
 def test_mass_law_rests_in_bends_and_while_nothing_pushes():
-    estimate = observe(SAME)[1].estimate
+    estimate = observe(SAME).estimate
     drive = noisy_drive(SAME)
     moved = np.abs(np.diff(estimate["mass"])) > 0.0
     turning = np.abs(drive.channel("yaw_rate"))[1:] > state_and_mass.LARGEST_YAW_RATE
@@ -148,20 +185,26 @@ def test_axle_forces_take_over_a_share_of_what_each_axle_lacks():
 
 
 def test_observer_with_axle_forces_runs_and_stays_with_the_vehicle():
-    extended = score(dataclasses.replace(MISMATCHED, estimator=state_study.WITH_FORCES))
-    plain = score(MISMATCHED)
-    assert extended.sideslip < 1.1 * plain.sideslip
-    assert extended.axle_force == pytest.approx(plain.axle_force, rel=0.1)
-    assert extended.axle_force != plain.axle_force
+    extended = dataclasses.replace(MISMATCHED, estimator="til-axle-forces")
+    assert sideslip(extended) < 1.1 * sideslip(MISMATCHED)
+    for axle in ("fy_front", "fy_rear"):
+        forces, plain = (figure(run, axle, "rmse") for run in (extended, MISMATCHED))
+        assert forces == pytest.approx(plain, rel=0.1)
+        assert forces != plain
 
 
-def test_static_map_and_open_loop_are_worse():
-    ours = score(MISMATCHED).sideslip
+def test_double_track_and_open_loop_are_worse():
     others = [
-        score(dataclasses.replace(MISMATCHED, estimator=name)).sideslip
+        sideslip(dataclasses.replace(MISMATCHED, estimator=name))
         for name in ("zero", "double-track")
     ]
-    assert ours < min(others)
+    assert sideslip(MISMATCHED) < min(others)
+
+
+def test_static_map_is_worse_and_estimates_no_mass():
+    run = dataclasses.replace(MISMATCHED, estimator="static-map")
+    assert sideslip(run) > sideslip(MISMATCHED)
+    assert {s.quantity for s in score(run)[0]} == {"sideslip"}
 
 
 def test_unknown_estimator_is_named():
@@ -169,33 +212,45 @@ def test_unknown_estimator_is_named():
         observe(dataclasses.replace(SAME, estimator="best"))
 
 
+def test_gains_of_a_file_are_used(tmp_path):
+    path = tmp_path / "gains.toml"
+    own = gains_of("sports_car", "til") | {"yaw_rate": 1.0}
+    lines = "\n".join(f"{name} = {value}" for name, value in own.items())
+    path.write_text(f'vehicle = "sports_car"\nestimator = "til"\n[gains]\n{lines}\n')
+    gains = of_run(path, laps.EXPERIMENT)
+    changed, plain = (
+        run_experiment(laps.EXPERIMENT, seeds=[0], duration=3.0, estimators=["til"], gains=one)
+        for one in (gains, None)
+    )
+    assert changed.rows[0].median != plain.rows[0].median
+
+
 def test_gains_of_another_car_are_refused(tmp_path):
     path = tmp_path / "gains.toml"
     path.write_text('vehicle = "suv"\nestimator = "til"\n')
-    settings = Settings(snr=20.0, seeds=(0,), jobs=1, duration=1.0, gains=path)
     with pytest.raises(TwinError, match="vehicle is 'suv'; allowed here: 'sports_car'"):
-        LAPS.run(settings)
+        of_run(path, laps.EXPERIMENT)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("drive", "sideslip"), [("laps", 0.08), ("lane-change", 0.06)])
-def test_default_observer_holds_its_marks_on_the_mismatched_car(drive, sideslip):
-    def median(estimator, field):
-        todo = [
-            Run(case="mismatched", drive=drive, estimator=estimator, seed=seed) for seed in range(3)
-        ]
-        return np.median([getattr(score(run), field) for run in todo])
+@pytest.mark.parametrize(("drive", "limit"), [("laps", 0.08), ("lane-change", 0.06)])
+def test_default_observer_holds_its_marks_on_the_mismatched_car(drive, limit):
+    experiment = sideslip_and_mass.experiment(drive)
 
-    ours = median("til", "sideslip")
-    assert ours < sideslip
-    assert median("til", "mass") < 10.0
+    def median(estimator, quantity, metric):
+        todo = runs(experiment, range(3), estimators=[estimator])
+        return np.median([figure(run, quantity, metric) for run in todo])
+
+    ours = median("til", "sideslip", "rmse")
+    assert ours < limit
+    assert median("til", "mass", "rmse_last_60s") < 10.0
     for other in ("double-track", "static-map", "zero"):
-        assert ours < median(other, "sideslip")
+        assert ours < median(other, "sideslip", "rmse")
 
 
 @pytest.mark.slow
 def test_default_observer_holds_its_marks_on_another_programs_car():
-    for drive in state_study.DRIVES:
-        found = score(Run(case=state_study.COMMONROAD, drive=drive, estimator="til"))
-        assert found.sideslip < 0.08
-        assert found.mass < 15.0
+    for drive in ("laps", "lane-change"):
+        run = Run(experiment=EXPERIMENT, case=case("commonroad", drive), estimator="til")
+        assert sideslip(run) < 0.08
+        assert figure(run, "mass", "rmse_last_60s") < 15.0
