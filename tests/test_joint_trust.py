@@ -82,7 +82,7 @@ def test_jump_of_the_sensitivities_makes_the_observer_wait(observer):
     state.blocks[1] = 100  # of driving
     h = np.zeros((len(OUTPUTS), state.z.size))
     h[2, 0] = 0.01  # 3 noises for the prior
-    state.before[:] = h
+    state.last_h[:] = h
     state.usual[:] = h[:, :2] ** 2
     wait_after_impact(config, state, 1.5 * h, variance)
     assert state.blocks[WAIT] == 0

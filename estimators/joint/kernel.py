@@ -12,6 +12,7 @@ from numba import njit
 
 from estimators.ensemble.blocks import kalman_step
 from estimators.ensemble.rigid_body import project
+from estimators.joint.evidence import FULL, add_evidence, forget_evidence
 from estimators.joint.linearisation_error import add_linearisation_error, wait_after_impact
 from estimators.joint.noise_inflation import forget_load, inflate_noise, keep, load_changed
 from estimators.joint.parameter_tracking import track_parameters, track_speed
@@ -40,7 +41,7 @@ from twin.kernel import is_sound, read_states, step
 
 @njit(cache=True, nogil=True)
 def update(cars, config, state, u, y):
-    """One sample of inputs (nu,) and measurements (ny,)."""
+    """One sample of inputs (nu,) and measurements (ny,); tells if a segment is complete."""
     for i in range(cars.size):
         step(cars[i], u, state.out[i])
     _delay(config, state)
@@ -53,15 +54,28 @@ def update(cars, config, state, u, y):
             state.present[j] += 1.0
     state.clock[SAMPLES] += 1
     if state.clock[SAMPLES] < config.block:
-        return
+        return False
     state.clock[SAMPLES] = 0
     state.clock[BLOCKS] += 1
-    _estimate(cars, config, state)
+    complete = _estimate(cars, config, state)
     track_speed(cars, config, state)
     state.total[:] = 0.0
     state.measured[:] = 0.0
     state.present[:] = 0.0
     state.edge[:] = state.late[0]
+    return complete
+
+
+@njit(cache=True, nogil=True)
+def start_evidence(config, state):
+    """Begins to collect evidence beyond what is known now."""
+    forget_evidence(state, config.segment)
+    state.prior_mean[:], state.prior_covariance[:] = state.z, state.covariance
+    if state.widening[0] > 0.0:
+        state.prior_covariance[:] *= state.widening[0]
+        for k in config.load:  # forgotten, not known badly
+            state.prior_covariance[k, k] = config.prior[k] ** 2
+    state.widening[0] = 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -165,11 +179,14 @@ def _is_excited(config, state):
 
 @njit(cache=True, nogil=True)
 def _estimate(cars, config, state):
-    """A Kalman step on the parameters, and the twins after them."""
+    """A Kalman step on the parameters, and the twins after them; tells if a segment is complete."""
+    complete = False
     read_states(cars[0], state.states[0])
     h = _sensitivity(config, state)
     r, variance = _innovation(config, state, h)
+    white = variance.copy()
     inflate_noise(config, state, h, r, variance)
+    inflated = variance.copy()
     wait_after_impact(config, state, h, variance)
     add_linearisation_error(config, state, h, variance)
     excited = _is_excited(config, state)
@@ -180,10 +197,15 @@ def _estimate(cars, config, state):
         keep(config, state)
     elif _changed(config, state, h, r):
         forget_load(config, state)
+        start_evidence(config, state)
         for i in range(config.parameter.size):
             state.estimate[config.parameter[i]] = state.z[i]
         track_parameters(cars, config, state)
     else:
+        for j in range(NY):
+            if white[j] < ABSENT:
+                white[j] += variance[j] - inflated[j]
+        complete = add_evidence(config, state, h, r, white)
         kalman_step(state.z, state.covariance, h, r, variance, config.step_limit)
         informed = np.empty_like(h)
         for j in range(NY):
@@ -195,6 +217,7 @@ def _estimate(cars, config, state):
         project(state.z, state.covariance, config.parameter, config.nominal, state.estimate)
         track_parameters(cars, config, state)
     _drift(config, state)
+    return complete
 
 
 @njit(cache=True, nogil=True)
@@ -222,20 +245,67 @@ def _drift(config, state):
 
 
 @njit(cache=True, nogil=True)
-def run(cars, config, state, inputs, measurements, log):
-    """All samples of a drive; returns how many were sound."""
+def run(cars, config, state, inputs, measurements, log, first):
+    """Samples of a drive from the first on, up to the end of a segment.
+
+    Returns:
+        The sample after the last that was taken, and whether all cars are sound.
+    """
     p = config.parameter.size
-    for k in range(inputs.shape[0]):
+    for k in range(first, inputs.shape[0]):
         read_states(cars[0], log.states[k])
-        update(cars, config, state, inputs[k], measurements[k])
+        complete = update(cars, config, state, inputs[k], measurements[k])
         log.parameters[k] = state.estimate
         log.outputs[k] = state.out[0]
         log.extended[k] = cars[0].tyre_output
-        for i in range(state.z.size):
-            log.sd[k, i] = np.sqrt(state.covariance[i, i])
+        _standard_deviations(config, state, log.sd[k])
         log.sensor_errors[k] = state.z[p:]
         log.changes[k] = state.changes[0]
+        log.segments[k] = state.evidence[FULL]
         for i in range(cars.size):
             if not is_sound(cars[i]):
-                return k
-    return inputs.shape[0]
+                return k, False
+        if complete:
+            return k + 1, True
+    return inputs.shape[0], True
+
+
+@njit(cache=True, nogil=True)
+def claim(config, state, log, k):
+    """Writes again what is known at a sample, after its evidence was weighed."""
+    log.parameters[k] = state.estimate
+    log.sensor_errors[k] = state.z[config.parameter.size :]
+    _standard_deviations(config, state, log.sd[k])
+
+
+@njit(cache=True, nogil=True)
+def take_over(config, state, z, covariance, noise):
+    """Goes on from weighed estimates (q,), (q, q) and factors of the noise (ny,).
+
+    The twins' speed is another in every segment: it stays as the filter has it.
+    """
+    q = z.size
+    for i in range(q):
+        error = i - config.parameter.size
+        if error >= 0 and config.sensor_error[error] == SPEED:
+            z[i] = state.z[i]
+            own = state.covariance[i, i]
+            covariance[i] = 0.0
+            covariance[:, i] = 0.0
+            covariance[i, i] = own
+    state.z[:], state.covariance[:] = z, covariance
+    for j in range(NY):
+        state.inflation[j] = max(state.inflation[j], noise[j])
+    for i in range(config.parameter.size, q):
+        if config.sensor_error[i - config.parameter.size] == DELAY:
+            state.z[i] = min(max(state.z[i], -config.dt), (RING - 2) * config.dt)
+    project(state.z, state.covariance, config.parameter, config.nominal, state.estimate)
+
+
+@njit(cache=True, nogil=True)
+def _standard_deviations(config, state, sd):
+    """Fills sd (q,) with what is claimed: the prior's until segments can be compared."""
+    for i in range(state.z.size):
+        known = state.widening[0] * state.covariance[i, i]
+        prior = config.prior[i] ** 2
+        sd[i] = np.sqrt(min(known, prior) if state.widening[0] > 0.0 else prior)

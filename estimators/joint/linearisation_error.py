@@ -69,7 +69,7 @@ def _is_impact(config, state, h, variance):
         jump, usual = 0.0, 0.0
         for i in range(config.parameter.size):
             certainty = state.covariance[i, i]
-            jump += (h[j, i] - state.before[j, i]) ** 2 * certainty
+            jump += (h[j, i] - state.last_h[j, i]) ** 2 * certainty
             usual += state.usual[j, i] * certainty
         if jump > max(usual, config.impact * variance[j]):
             return True
@@ -81,4 +81,4 @@ def wait_after_impact(config, state, h, variance):
     """Has the observer wait a little after an impact."""
     if state.blocks[DRIVEN] > 0 and _is_impact(config, state, h, variance):
         state.blocks[WAIT] = round(config.impact_wait / (config.block * config.dt))
-    state.before[:] = h
+    state.last_h[:] = h

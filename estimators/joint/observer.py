@@ -15,8 +15,12 @@ from estimators.black_box import settle
 from estimators.drive_channels import check_measurements, given_by
 from estimators.entry import Entry, Given
 from estimators.joint import kernel as joint_kernel
+from estimators.joint.evidence import FILLED, FULL, SEGMENTS, USED, merge_segments
+from estimators.joint.evidence import SCALES as WINDOWS
+from estimators.joint.model_error import DIFFERS, budget
 from estimators.joint.sensor_errors import SENSOR_ERROR, SENSOR_ERRORS
 from estimators.joint.state import RING, Configuration, Log, State
+from estimators.joint.validity import REASONS, judge
 from estimators.priors import initial_deltas
 from twin import (
     LOAD,
@@ -37,7 +41,7 @@ Array = NDArray[np.float64]
 # Settings and what they may be: the least, and whether that itself is allowed
 _POSITIVE = (
     *("tracking_time", "slip_range", "inflation_time", "change_time", "step_limit"),
-    *("valid_share", "impact"),
+    *("valid_share", "impact", "segment"),
 )
 _NOT_NEGATIVE = (
     *("noise_inflation", "watch", "settle", "detection_threshold", "least_change", "drift"),
@@ -78,6 +82,7 @@ class JointSettings:
         impact_wait: seconds after an impact without corrections.
         hold_off: seconds before the first correction.
         block: samples per correction.
+        segment: seconds of used driving that are compared with one another.
         speed_gain: draws each twin's speed to the measured wheel speeds [1/s].
         least_excitation: variance over a second below which nothing is corrected [m2/s4]: that of
             ax and ay, and 900 m2/s2 times that of roll and pitch rate.
@@ -104,6 +109,7 @@ class JointSettings:
     impact_wait: float = 0.2
     hold_off: float = 1.0
     block: int = 10
+    segment: float = 2.5
     speed_gain: float = 0.5
     least_excitation: float = 0.02
 
@@ -215,6 +221,7 @@ class JointObserver:
             noise=np.asarray(noise_sd, dtype=np.float64) ** 2,
             nominal=first.car.nominal.copy(),
             block=settings.block,
+            segment=max(1, round(settings.segment / (settings.block * self.dt))),
             hold_off=round(settings.hold_off / (settings.block * self.dt)),
             speed_gain=settings.speed_gain,
             least_excitation=settings.least_excitation,
@@ -237,7 +244,7 @@ class JointObserver:
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
             present=np.zeros(ny), states=np.zeros((n, nx)), dx=np.zeros(nx), p=np.zeros(p),
             rate=np.zeros(len(names)), went=np.zeros(len(names)),
-            usual=np.zeros((ny, len(names))), before=np.zeros((ny, q)),
+            usual=np.zeros((ny, len(names))), last_h=np.zeros((ny, q)),
             excitation=np.zeros((2, 4)),
             information=np.zeros((q, q)), clock=np.zeros(3, dtype=np.int64),
             ring=np.zeros((RING, n, ny)), late=np.zeros((n, ny)), edge=np.zeros(ny),
@@ -245,6 +252,13 @@ class JointObserver:
             recent=np.zeros((q, q)), score=np.zeros(q), kept=np.zeros(q),
             kept_covariance=np.zeros((q, q)), kept_inflation=np.zeros(ny),
             blocks=np.zeros(3, dtype=np.int64), changes=np.zeros(1, dtype=np.int64),
+            widening=np.zeros(1), segment_information=np.zeros((SEGMENTS, ny, q, q)),
+            segment_score=np.zeros((SEGMENTS, ny, q)),
+            scale_information=np.zeros((WINDOWS.size, ny, q, q)),
+            scale_score=np.zeros((WINDOWS.size, ny, q)),
+            scale_square=np.zeros((WINDOWS.size, ny, 2)),
+            window_sums=np.zeros((WINDOWS.size, ny, 2 + q)), prior_mean=np.zeros(q),
+            prior_covariance=np.zeros((q, q)), evidence=np.zeros(4, dtype=np.int64),
         )  # fmt: skip
         self.reset(0.0)
 
@@ -269,6 +283,8 @@ class JointObserver:
         state.z[: self._config.parameter.size] = state.theta[self._config.parameter]
         state.covariance[:] = np.diag(self._prior**2)
         state.inflation[:] = self.settings.noise_inflation
+        joint_kernel.start_evidence(self._config, state)
+        self.budget = None
         for i, twin in enumerate(self.ensemble.twins):
             p = state.theta.copy()
             if i > 0:
@@ -276,10 +292,43 @@ class JointObserver:
             twin.set_parameters(p)
             settle(twin, speed, road)
 
+    def _weigh(self) -> None:
+        """Weighs the evidence at the end of a segment, and goes on from what it says."""
+        config, state = self._config, self._state
+        if state.evidence[FULL] < 2:
+            return
+        used = float(state.evidence[USED]) * config.block * self.dt
+        names = self.settings.sensor_errors
+        speed = config.parameter.size + names.index("speed") if "speed" in names else None
+        found = budget(state, self._prior, state.prior_mean, state.prior_covariance, speed, used)
+        state.widening[0] = found.widening
+        joint_kernel.take_over(
+            config, state, found.z.copy(), found.covariance.copy(), found.noise_factor
+        )
+        merge_segments(state)
+        self.budget = found
+
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of the drive so far, in sentences."""
+        if self.budget is None:
+            return (
+                f"Nothing is known yet: {2 * self.settings.segment:g} s of driving that excites "
+                "the car are needed before its parts can be compared.",
+            )
+        worst = np.nan_to_num(np.nanmax(np.nan_to_num(self.budget.whiteness), axis=0))
+        channel = int(np.argmax(worst))
+        if worst[channel] < DIFFERS:
+            return ()
+        return (
+            f"The car differs from its twin: the residual of {OUTPUTS[channel]} varies "
+            f"{np.sqrt(worst[channel]):.2g} times as much as its noise explains. The standard "
+            f"deviations are {np.sqrt(self.budget.widening):.2g} times those of noise alone.",
+        )
+
     @property
     def covariance(self) -> Array:
-        """(p + b, p + b) of `estimated`, now."""
-        return self._state.covariance.copy()
+        """(p + b, p + b) of `estimated`, now, errors of the model included."""
+        return self._state.covariance * max(float(self._state.widening[0]), 1.0)
 
     def update(self, u: ArrayLike, y: ArrayLike) -> Array:
         """Takes one sample of inputs (13,) and measurements (10,); returns the parameters (15,).
@@ -291,7 +340,8 @@ class JointObserver:
         y = np.ascontiguousarray(y, dtype=np.float64)
         check_inputs(u[None], "update")
         check_measurements(y[None], OUTPUTS, "update", infinite=False)
-        joint_kernel.update(self.ensemble.cars, self._config, self._state, u, y)
+        if joint_kernel.update(self.ensemble.cars, self._config, self._state, u, y):
+            self._weigh()
         for twin in self.ensemble.twins:
             twin.check()
         return self._state.estimate.copy()
@@ -323,6 +373,7 @@ class JointObserver:
             twin.restore(kept)
         for array, kept in zip(self._state, snapshot.state, strict=True):
             array[:] = kept
+        self.budget = None
 
     def run(self, drive: Drive) -> JointEstimate:
         """Observes a whole drive, from the state that the observer is in.
@@ -343,12 +394,20 @@ class JointObserver:
             sd=np.empty((n, q)),
             sensor_errors=np.empty((n, q - self._config.parameter.size)),
             changes=np.empty(n, dtype=np.int64),
+            segments=np.empty(n, dtype=np.int64),
         )
-        done = joint_kernel.run(
-            self.ensemble.cars, self._config, self._state, given.inputs, given.measurements, log
-        )
-        if done < n:
-            raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
+        done = 0
+        while done < n:
+            done, sound = joint_kernel.run(
+                self.ensemble.cars, self._config, self._state, given.inputs, given.measurements,
+                log, done,
+            )  # fmt: skip
+            if not sound:
+                raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
+            if self._state.evidence[FILLED] == 0 and self._state.evidence[USED] > 0:
+                self._weigh()
+                joint_kernel.claim(self._config, self._state, log, done - 1)
+        valid, reason = judge(log, self._config, self.settings)
         return JointEstimate(
             time=drive.time,
             states=log.states,
@@ -360,10 +419,13 @@ class JointObserver:
             sensor_error_names=self.settings.sensor_errors,
             prior=self._prior.copy(),
             sd=log.sd,
-            valid=log.sd < self.settings.valid_share * self._prior,
+            valid=valid,
+            reason=reason,
+            reasons=REASONS,
+            notes=self.notes(),
             changes=log.changes,
             sensor_errors=log.sensor_errors,
-            covariance=self._state.covariance.copy(),
+            covariance=self.covariance,
             information=self._state.information.copy(),
         )
 

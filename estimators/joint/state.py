@@ -47,6 +47,7 @@ class Configuration(NamedTuple):
     noise: Array  # (ny,) variance of a sample's noise; NaN: the channel is not used
     nominal: Array  # (np,) the unloaded chassis
     block: int  # samples
+    segment: int  # blocks of used driving
     hold_off: int  # blocks before the first correction
     speed_gain: float  # of the twins' speeds [1/s]
     least_excitation: float  # [m2/s4]
@@ -81,7 +82,7 @@ class State(NamedTuple):
     rate: Array  # (p,) at which the twins move, times the tracking time
     went: Array  # (p,) what they moved recently
     usual: Array  # (ny, p) mean squares of the sensitivities
-    before: Array  # (ny, q) sensitivities of the block before
+    last_h: Array  # (ny, q) sensitivities of the block before
     excitation: Array  # (2, 4) means and squares of what excites
     information: Array  # (q, q) of what was used
     ring: Array  # (RING, n, ny) the twins' last outputs
@@ -98,6 +99,17 @@ class State(NamedTuple):
     blocks: Indices  # (3,)
     changes: Indices  # (1,) of the load, so far
     clock: Indices  # (3,)
+    widening: Array  # (1,) factor of the covariance for errors of the model; 0: not yet known
+    # see `estimators.joint.evidence`
+    segment_information: Array  # (K, ny, q, q) upper triangles
+    segment_score: Array  # (K, ny, q)
+    scale_information: Array  # (scales, ny, q, q) upper triangles
+    scale_score: Array  # (scales, ny, q)
+    scale_square: Array  # (scales, ny, 2) and the number of windows
+    window_sums: Array  # (scales, ny, 2 + q) of measurements, variances, sensitivities
+    prior_mean: Array  # (q,) estimates before the evidence
+    prior_covariance: Array  # (q, q)
+    evidence: Indices  # (4,) counts
 
 
 class Log(NamedTuple):
@@ -110,3 +122,4 @@ class Log(NamedTuple):
     sd: Array  # (N, q)
     sensor_errors: Array  # (N, q - p)
     changes: Indices  # (N,)
+    segments: Indices  # (N,) of used driving so far, not more than are kept

@@ -124,13 +124,9 @@ def unit_of(parameter: str) -> str:
 
 def _noise_sd(drive: Drive) -> Array:
     """(10,) of white noise: from second differences, whose variance is six times the noise's."""
-    known = drive.settings.get("noise_sd")
-    if isinstance(known, dict) and set(OUTPUTS) <= set(known):
-        found = np.array([known[name] for name in OUTPUTS], dtype=np.float64)
-    else:
-        bends = np.abs(np.diff(drive.measurements[:, : len(OUTPUTS)], n=2, axis=0))
-        bends = np.where(np.isfinite(bends), bends, 0.0)
-        found = 1.4826 * np.median(bends, axis=0) / np.sqrt(6.0)
+    bends = np.abs(np.diff(drive.measurements[:, : len(OUTPUTS)], n=2, axis=0))
+    bends = np.where(np.isfinite(bends), bends, 0.0)
+    found = 1.4826 * np.median(bends, axis=0) / np.sqrt(6.0)
     return np.maximum(found, _LEAST_NOISE)
 
 
