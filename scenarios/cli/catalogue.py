@@ -55,6 +55,9 @@ SCENARIOS = _scenarios(Path(__file__).parents[1])
 _TABLES, _FIGURES = "scenarios.papers.til_tables", "scenarios.papers.til_figures"
 _STATES, _TRUCK = "scenarios.papers.state_figures", "scenarios.papers.truck"
 REPRODUCTIONS = {
+    "honesty": Entry(
+        "scenarios.papers.honesty:honesty", "are the claims true on cars that are not the twin?"
+    ),
     "til-table-3": Entry(f"{_TABLES}:table_3", "load parameters of the empty and loaded car"),
     "til-table-4": Entry(f"{_TABLES}:table_4", "mass: noise, wrong CM"),
     "til-table-5": Entry(f"{_TABLES}:table_5", "roll and yaw inertia: noise, wrong mass, wrong CM"),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.base import Estimate
+from estimators.joint.noise import noise_of_record
 from estimators.joint.observer import JointObserver, JointSettings
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
@@ -17,8 +18,6 @@ from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
 from twin import LOAD, OUTPUTS, SCALES, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
-# Least noise that a sensor is believed to have, as in the simulated drives
-_LEAST_NOISE = (0.05, 0.05, 0.05, 0.003, 0.003, 0.003, 0.05, 0.05, 0.05, 0.05)
 
 
 class Found(NamedTuple):
@@ -104,7 +103,9 @@ def joint(vehicle: Vehicle, log: Prepared) -> Found:
         raise TwinError("the joint estimator takes no gaps of this length; allowed: til")
     piece = Drive.joined(log.pieces)
     names = measured(log.pieces)
-    noise = np.where([name in names for name in OUTPUTS], _noise_sd(piece), np.nan)
+    noise = np.where(
+        [name in names for name in OUTPUTS], noise_of_record(piece.measurements), np.nan
+    )
     observer = JointObserver(vehicle, noise, JointSettings(parameters=(*LOAD, *SCALES)))
     observer.reset(start_speed(piece, rolling_radius(Observer(Twin(vehicle), []))))
     plain = piece.replace(measurements=piece.measurements[:, : len(OUTPUTS)], output_names=OUTPUTS)
@@ -120,14 +121,6 @@ ESTIMATORS: dict[str, Callable[[Vehicle, Prepared], Found]] = {"til": til, "join
 def unit_of(parameter: str) -> str:
     """Of a parameter of `twin.PARAMETERS`."""
     return "1" if parameter in SCALES else {"m": "kg", "c": "m", "J": "kg m2"}[parameter[0]]
-
-
-def _noise_sd(drive: Drive) -> Array:
-    """(10,) of white noise: from second differences, whose variance is six times the noise's."""
-    bends = np.abs(np.diff(drive.measurements[:, : len(OUTPUTS)], n=2, axis=0))
-    bends = np.where(np.isfinite(bends), bends, 0.0)
-    found = 1.4826 * np.median(bends, axis=0) / np.sqrt(6.0)
-    return np.maximum(found, _LEAST_NOISE)
 
 
 def _joined(estimates: Sequence[Estimate]) -> Estimate:

@@ -29,7 +29,7 @@ def figure(path: Path, *, title: str, rows: int = 1, shared: bool = True) -> Ite
         from matplotlib.figure import Figure
     except ImportError:
         raise TwinError(
-            f"{path.name}: pictures need matplotlib: pip install 'twin-in-the-loop[plots]'"
+            f"{path.name}: pictures need matplotlib: pip install -e '.[plots]' in the project"
         ) from None
     sheet = Figure(figsize=(8.0, 2.0 + 2.5 * rows), dpi=120, layout="constrained")
     sheet.suptitle(title)
