@@ -2,7 +2,8 @@
 
 The force at the road is the measured longitudinal acceleration times the mass, drag, and what
 the twin's speed lacks; a positive one drives, a negative one brakes. With a force made to fit, the
-mass is not observable: scaling it scales the force.
+mass is not observable: scaling it scales the force. A wheel whose tyre cannot carry its torque gets
+less of it, or a twin with too little grip would spin its wheels up without end.
 """
 
 from typing import NamedTuple
@@ -15,7 +16,13 @@ from twin import INPUTS, STATES, TwinError
 TORQUES = tuple(name for name in INPUTS if "torque" in name)
 HALF_AIR_DENSITY = 0.6  # [kg/m3]
 
+# Slip of a wheel from which its torque is reduced, and at which nothing is left of it; chosen:
+# beyond the peak of a tyre's force
+SLIP_LIMITED, LARGEST_SLIP = 0.15, 0.3
+SLOWEST = 3.0  # [m/s], slower than this slip is taken at this speed
+
 _VX = STATES.index("vx")
+_SPIN = STATES.index("wheel_speed_fl")
 _REAR_LEFT, _REAR_RIGHT = STATES.index("wheel_speed_rl"), STATES.index("wheel_speed_rr")
 
 
@@ -72,3 +79,11 @@ def follow(follower, speed, acceleration, states, u):
     else:
         u[5] = u[6] = -front * follower.brake_front
         u[7] = u[8] = -rear * (1.0 - follower.brake_front)
+    for w in range(4):
+        radius = follower.radius_front if w < 2 else follower.radius_rear
+        slip = (radius * states[_SPIN + w] - states[_VX]) / max(abs(states[_VX]), SLOWEST)
+        left = (LARGEST_SLIP - abs(slip)) / (LARGEST_SLIP - SLIP_LIMITED)
+        left = min(max(left, 0.0), 1.0)
+        if slip * force > 0.0:
+            u[1 + w] *= left
+            u[5 + w] *= left

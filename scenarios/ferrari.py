@@ -179,9 +179,9 @@ def tune(estimator: str, path: Path, *, jobs: int, evaluations: int) -> Result:
         free=tuple(FREE),
         prior_sd=FREE,
         signals=SIGNALS,
-        drive=cut(drive, part(drive, CALIBRATED_ON)),
+        drives=(cut(drive, part(drive, CALIBRATED_ON)),),
     )
-    return calibrate.run(task, file, path, jobs=jobs, evaluations=evaluations)
+    return calibrate.run(task, [file], path, jobs=jobs, evaluations=evaluations)
 
 
 def picture(trials: Sequence[Trial], path: Path) -> None:

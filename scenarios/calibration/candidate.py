@@ -10,6 +10,7 @@ from estimators.base import Estimate
 from estimators.speed_follower import SpeedFollower
 from estimators.til.observer import Observer
 from scenarios.calibration.free_parameters import FREE, Kind
+from scenarios.logs.pieces import start_speed
 from twin import Drive, Twin, Vehicle
 
 Array = NDArray[np.float64]
@@ -45,7 +46,8 @@ class Candidate:
         follower = self.follower and self.follower._replace(**self.of("follower"))
         twin = Twin(self.vehicle.scaled(**self.of("scale")))
         observer = Observer(twin, (), gains, follower=follower)
-        observer.reset(_first_speed(drive), self.of("load"))
+        radius = float(np.mean(self.vehicle.figures.wheel_radius))
+        observer.reset(_first_speed(drive, radius), self.of("load"))
         return observer.run(self._shifted(drive))
 
     def sideslip(self, estimate: Estimate) -> Array:
@@ -60,12 +62,15 @@ class Candidate:
         inputs, measurements = drive.inputs.copy(), drive.measurements.copy()
         steering = drive.input_names.index("steering_wheel_angle")
         inputs[:, steering] += self.values.get("steering_offset", 0.0)
-        measurements[:, drive.output_names.index("ay")] -= self.values.get("ay_offset", 0.0)
+        for k, name in enumerate(drive.output_names):
+            measurements[:, k] -= self.values.get(f"{name}_offset", 0.0)
         return drive.replace(inputs=inputs, measurements=measurements)
 
 
-def _first_speed(drive: Drive) -> float:
-    """Measured, or true where only the truth has it; a standstill where nobody knows [m/s]."""
-    if "vx" in drive.output_names:
+def _first_speed(drive: Drive, radius: float) -> float:
+    """Measured, by wheels of that radius [m] if need be; true where nobody measured it [m/s]."""
+    if "vx" not in drive.output_names and "vx" in drive.truth:
+        return max(float(drive.truth["vx"][0]), 0.0)
+    if "vx" in drive.output_names and np.isfinite(drive.channel("vx")[0]):
         return max(float(drive.channel("vx")[0]), 0.0)
-    return max(float(drive.truth["vx"][0]), 0.0) if "vx" in drive.truth else 0.0
+    return start_speed(drive, radius)

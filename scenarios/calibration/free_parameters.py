@@ -5,13 +5,16 @@ Most are factors on what a car's files say (`Vehicle.scaled`), some are paramete
 its sensors, how the unknown torques are made, gains.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from twin import TwinError
+from twin import OUTPUTS, PARAMETER, RATES, TwinError
 from twin.parameters import LARGEST_SCALE, LEAST_SCALE
 from twin.scales import VEHICLE_SCALES
+
+SCALE_SD = 0.25  # prior of a factor; chosen: a data sheet's tyres, springs and dampers
 
 Kind = Literal["scale", "load", "offset", "follower", "gain"]
 
@@ -27,6 +30,7 @@ class Free:
         start: where it is not given.
         low, high: bounds.
         scale: a change that makes a difference.
+        prior_sd: how far it is believed to lie from its start; inf: nothing is believed.
         of: the gain's (state, output).
     """
 
@@ -36,25 +40,29 @@ class Free:
     low: float
     high: float
     scale: float
+    prior_sd: float = math.inf
     of: tuple[str, str] = ("", "")
 
 
 def _scale() -> Free:
     return Free(
-        kind="scale", unit="1", start=1.0, low=LEAST_SCALE, high=LARGEST_SCALE, scale=0.3
+        kind="scale", unit="1", start=1.0, low=LEAST_SCALE, high=LARGEST_SCALE, scale=0.3,
+        prior_sd=SCALE_SD,
     )  # fmt: skip
 
 
-def _delta(unit: str, least: float, largest: float) -> Free:
+def _delta(name: str, least: float, largest: float) -> Free:
     return Free(
-        kind="load", unit=unit, start=0.0, low=least, high=largest, scale=0.2 * (largest - least)
-    )
+        kind="load", unit=PARAMETER[name].unit, start=0.0, low=least, high=largest,
+        scale=0.2 * (largest - least), prior_sd=PARAMETER[name].prior_sd,
+    )  # fmt: skip
 
 
 def _offset(unit: str, largest: float) -> Free:
     return Free(
-        kind="offset", unit=unit, start=0.0, low=-largest, high=largest, scale=0.1 * largest
-    )
+        kind="offset", unit=unit, start=0.0, low=-largest, high=largest, scale=0.1 * largest,
+        prior_sd=0.3 * largest,
+    )  # fmt: skip
 
 
 def _gain(unit: str, start: float, low: float, high: float, of: tuple[str, str]) -> Free:
@@ -66,19 +74,33 @@ def _gain(unit: str, start: float, low: float, high: float, of: tuple[str, str])
 # Bounds are chosen: wide for a passenger car whose files are roughly right.
 FREE: Mapping[str, Free] = {
     **{name: _scale() for name in VEHICLE_SCALES},
-    "mass": _delta("kg", -500.0, 1000.0),
-    "cm_x": _delta("m", -0.3, 0.3),
-    "cm_y": _delta("m", -0.1, 0.1),
-    "cm_z": _delta("m", -0.2, 0.2),
-    "Jzz": _delta("kg m2", -600.0, 1500.0),
+    "mass": _delta("mass", -500.0, 1000.0),
+    "cm_x": _delta("cm_x", -0.3, 0.3),
+    "cm_y": _delta("cm_y", -0.1, 0.1),
+    "cm_z": _delta("cm_z", -0.2, 0.2),
+    "Jxx": _delta("Jxx", -300.0, 500.0),
+    "Jyy": _delta("Jyy", -1000.0, 2500.0),
+    "Jzz": _delta("Jzz", -600.0, 1500.0),
+    "Jxy": _delta("Jxy", -100.0, 100.0),
+    "Jxz": _delta("Jxz", -300.0, 300.0),
+    "Jyz": _delta("Jyz", -100.0, 100.0),
     "steering_offset": _offset("rad", 0.03),  # of the hand wheel: that of the road wheels x ratio
-    "ay_offset": _offset("m/s2", 1.0),
+    **{f"{name}_offset": _offset("m/s2", 1.0) for name in ("ax", "ay", "az")},
+    **{f"{name}_offset": _offset("rad/s", 0.05) for name in OUTPUTS[RATES]},
     "sideslip_offset": _offset("rad", 0.03),
     # the measured sideslip's point lies so far before the twin's IMU
     "sideslip_lever": _offset("m", 0.6),
-    "brake_front": Free(kind="follower", unit="1", start=0.65, low=0.3, high=0.9, scale=0.1),
+    "brake_front": Free(
+        kind="follower", unit="1", start=0.65, low=0.3, high=0.9, scale=0.1, prior_sd=0.1
+    ),
     "locking": Free(
-        kind="follower", unit="N m s/rad", start=0.0, low=0.0, high=3000.0, scale=300.0
+        kind="follower",
+        unit="N m s/rad",
+        start=0.0,
+        low=0.0,
+        high=3000.0,
+        scale=300.0,
+        prior_sd=500.0,
     ),
     "yaw_rate_to_yaw_rate": _gain("1/s", 20.0, 0.0, 100.0, ("yaw_rate", "yaw_rate")),
     "yaw_rate_to_vy": _gain("m/s per rad", 0.0, -50.0, 50.0, ("vy", "yaw_rate")),

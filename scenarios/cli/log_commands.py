@@ -38,8 +38,21 @@ def inspect(log: Path, map_path: Path | None, vehicle: str | None) -> None:
 
 
 @click.command()
-@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, or an MJCF file.")
+@click.argument(
+    "logs",
+    metavar="LOG...",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+)
+@click.option(
+    "--map",
+    "map_path",
+    type=click.Path(path_type=Path),
+    metavar="MAP.toml",
+    help="Which channels of the logs are ours; a drive of ours needs none.",
+)
+@click.option("--vehicle", required=True, metavar="CAR", help="A car's name, MJCF or TOML file.")
 @click.option("--free", required=True, type=Names(), metavar="NAME,...", help="What is fitted.")
 @click.option(
     "--fit",
@@ -59,7 +72,8 @@ def inspect(log: Path, map_path: Path | None, vehicle: str | None) -> None:
 )
 @json_option
 def calibrate(
-    log: Path,
+    logs: tuple[Path, ...],
+    map_path: Path | None,
     vehicle: str,
     free: tuple[str, ...],
     signals: tuple[str, ...],
@@ -70,17 +84,27 @@ def calibrate(
     out: Path | None,
     json_path: Path | None,
 ) -> None:
-    """Fit the twin of a car to LOG, a recorded drive, by bounded least squares.
+    """Fit the twin of a car to LOGs, recorded drives, by bounded least squares.
 
-    FILE holds values, their 95 % confidence intervals and where they come from. A factor of 1 and a
-    delta or offset of 0 are what the car's files say. Where the log has no torques the twin
-    follows its measured vx, and the mass is not observable.
+    FILE holds values, their 95 % confidence intervals and where they come from; it is a car that
+    --vehicle takes. A factor of 1 and a delta or offset of 0 are what the car's files say, and are
+    believed beforehand as far as the data do not say otherwise. The last quarter of each log is not
+    fitted: the result is scored on it. Where a log has no torques the twin follows the measured vx,
+    and the mass is not observable.
+
+    What can be freed: factors of tyre_friction, cornering_stiffness, slip_stiffness,
+    combined_slip, load_of_largest_stiffness, lateral_curvature and relaxation, each also with
+    front_ or rear_ before it, of spring, damper, drag, front_anti_roll, rear_anti_roll,
+    steering_ratio, drive_torque, brake_torque; deltas of mass, cm_x, cm_y, cm_z, Jxx, Jyy, Jzz,
+    Jxy, Jxz, Jyz; steering_offset, sideslip_offset, sideslip_lever and ax_offset to
+    yaw_rate_offset; brake_front, locking; the gains yaw_rate_to_yaw_rate, yaw_rate_to_vy, ay_to_vy.
     """
     path = out or Path("out", "calibrate.toml")
     path.parent.mkdir(parents=True, exist_ok=True)
     calibration = catalogue.calibrate()
-    task = calibration.task_of(log, vehicle, free, signals, (first, last))
-    report(calibration.run(task, log, path, jobs=jobs, evaluations=evaluations), json_path)
+    task, held_out = calibration.task_of(logs, map_path, vehicle, free, signals, (first, last))
+    found = calibration.run(task, logs, path, jobs=jobs, evaluations=evaluations, held_out=held_out)
+    report(found, json_path)
 
 
 @click.command()

@@ -12,8 +12,8 @@ from estimators.joint.noise import noise_of_record
 from estimators.joint.observer import JointObserver, JointSettings
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
-from scenarios.calibration.calibrate import driven
 from scenarios.logs.default_observer import default_observer
+from scenarios.logs.follower import driven
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
 from twin import LOAD, OUTPUTS, SCALES, Drive, Twin, TwinError, Vehicle
 

@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 
 import models
+from twin.car.calibrated import calibrated_of
+from twin.car.deltas import apply_deltas, check_deltas
 from twin.car.figures import OPTIONAL, Figures, Grip, figures_of, grip_of, number
 from twin.car.geometry import check_geometry
 from twin.car.load import PointMass, RigidBody
@@ -18,6 +20,7 @@ from twin.channels import CHANNEL, OUTPUTS, WHEELS
 from twin.errors import TwinError
 from twin.parameters import LARGEST_SCALE, LEAST_SCALE
 from twin.scales import VEHICLE_SCALES, scale_model, scale_tyres
+from twin.toml_file import read_toml
 from twin.tyre.files import read_tyre_file
 
 # Numbers of <custom> that every car needs, with the least and largest that are allowed
@@ -40,20 +43,30 @@ class Vehicle:
         source: the MJCF file, or the TOML file of `twin.car.fields`.
         loads: point masses fixed to the chassis as bodies of their own.
         scales: what differs from the files by a factor, see `scaled`.
+        deltas: what the chassis differs in from the files, see `changed`.
     """
 
     source: Path
     loads: tuple[PointMass, ...] = ()
     scales: tuple[tuple[str, float], ...] = ()
+    deltas: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def load(cls, name: str | Path) -> "Vehicle":
         """A car of the project by its name ("suv"), or of any MJCF or TOML file by its path.
 
+        A TOML file may be one that `til calibrate` wrote: another car, and what differs from it.
+
         Raises:
             TwinError: no such file, or one that does not describe a car; the message says why.
         """
-        vehicle = cls(source=models.path(str(name)))
+        source = models.path(str(name))
+        if source.suffix == ".toml" and source.is_file():
+            found = calibrated_of(source, read_toml(source))
+            if found is not None:
+                base = cls.load(found.base)
+                return base.scaled(**found.scales).changed(**found.deltas)
+        vehicle = cls(source=source)
         vehicle.compile()
         return vehicle
 
@@ -81,6 +94,19 @@ class Vehicle:
         before = dict(self.scales)
         merged = before | {name: before.get(name, 1.0) * f for name, f in factors.items()}
         return replace(self, scales=tuple(merged.items()))
+
+    def changed(self, **deltas: float) -> "Vehicle":
+        """The same car but for deltas of its chassis, of `twin.LOAD`, as in `mass=85.0` [SI].
+
+        Raises:
+            TwinError: a name is unknown, or no rigid body is so.
+        """
+        check_deltas(self.source, deltas)
+        before = dict(self.deltas)
+        merged = before | {name: before.get(name, 0.0) + d for name, d in deltas.items()}
+        vehicle = replace(self, deltas=tuple(merged.items()))
+        vehicle.compile()
+        return vehicle
 
     def spec(self) -> mujoco.MjSpec:
         """The car as an editable MJCF, loads attached.
@@ -122,6 +148,7 @@ class Vehicle:
             raise TwinError(f"{self.source}: {' '.join(str(error).split())}") from None
         self._check(model)
         scale_model(model, dict(self.scales))
+        apply_deltas(model, dict(self.deltas), self.source)
         return model
 
     def _check(self, model: mujoco.MjModel) -> None:
