@@ -39,7 +39,7 @@ class Scored:
     Attributes:
         load: [kg].
         half_width: of its 95 % interval [kg].
-        believable: whether it trusts itself; the others than weighing have no opinion.
+        believable: whether it trusts itself; the regression has no opinion.
     """
 
     load: float
@@ -138,7 +138,7 @@ def _rescaled(car: Car, answer: TwinAnswer, others: Sequence[TwinAnswer]) -> Sco
     scatter = fit_scatter(ratio, sd, np.zeros(len(others)), declared)
     load = (answer.mass + car.rotating_mass) / scatter.scale - inertial
     half_width = _NORMAL_95 * scatter.sd(answer.sd / inertial) / scatter.scale * inertial
-    return Scored(load=load, half_width=half_width)
+    return Scored(load=load, half_width=half_width, believable=not answer.at_bound)
 
 
 def as_scored(weighings: Sequence[Weighing]) -> Mapping[str, Scored]:

@@ -33,6 +33,9 @@ PRIOR_SD = 300.0  # [kg]: a full car
 NOISE_DENSITY = 0.16
 OFFSET_SD = 0.3  # [m/s2], of the accelerometer and the rolling resistance
 LEAST_ACCELERATION = 0.1  # [m/s2] of the twin, below which drag tells more than the mass
+# Of the mass, that a load adds or takes; chosen. A log whose speed is not its accelerometer's would
+# else drive the mass to any number, and the twin to a standstill
+LARGEST_SHARE = 0.6
 PIECE = 60.0  # [s] of the trip at a time: a twin's history is long
 
 
@@ -44,11 +47,13 @@ class TwinAnswer:
         name: of the trip.
         mass: of the car with everything in it, by the calibration's scale [kg].
         sd: standard deviation that the law claims [kg].
+        at_bound: whether the mass has ever been at the bound of its estimate.
     """
 
     name: str
     mass: float
     sd: float
+    at_bound: bool
 
 
 def twin_answer(vehicle: Vehicle, trip: Trip, calibration: Calibration) -> TwinAnswer:
@@ -70,6 +75,7 @@ def twin_answer(vehicle: Vehicle, trip: Trip, calibration: Calibration) -> TwinA
         offset_sd=OFFSET_SD,
         least_signal=LEAST_ACCELERATION,
         compensation=WHEEL_SPEED * float(twin.car.spin_inertia[0]) / (car.radius * car.mass),
+        largest=LARGEST_SHARE * car.mass,
     )
     names = [f"wheel_speed_{wheel}" for wheel in ROLLING]
     observer = Observer(twin, [law], {(name, name): WHEEL_SPEED for name in names})
@@ -79,14 +85,21 @@ def twin_answer(vehicle: Vehicle, trip: Trip, calibration: Calibration) -> TwinA
     observer.reset(float(speed[0]))
     # a torque pushes with the height of the hub, which is less than the rolling radius
     lever = float(twin.data.xpos[twin.car.wheel_body[2:], 2].mean())
-    last, mass = float(trip.time[-1]), 0.0
+    last, mass, at_bound = float(trip.time[-1]), 0.0, False
     for start in np.arange(trip.time[0], last, PIECE):
         time = np.arange(start, min(start + PIECE, last), twin.dt)
         if time.size < 2:
             break
         drive = _drive(time, trip.time, force * lever, speed / car.radius, hidden)
-        mass = float(observer.run(drive)["mass"][-1])
-    return TwinAnswer(name=trip.name, mass=car.mass + mass, sd=observer.parameter_sd()["mass"])
+        history = observer.run(drive)["mass"]
+        mass = float(history[-1])
+        at_bound |= bool((np.abs(history) >= (1.0 - 1e-6) * law.largest).any())
+    return TwinAnswer(
+        name=trip.name,
+        mass=car.mass + mass,
+        sd=observer.parameter_sd()["mass"],
+        at_bound=at_bound,
+    )
 
 
 def _with_drag(vehicle: Vehicle, drag_area: float) -> Vehicle:
