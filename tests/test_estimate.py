@@ -14,7 +14,7 @@ from scenarios.driving.manoeuvres import urban
 from scenarios.driving.record import record
 from scenarios.logs import stream as estimate_stream
 from scenarios.logs.estimate import Task, observe
-from scenarios.logs.pieces import measured, prepared
+from scenarios.logs.pieces import lacking, measured, prepared
 from twin import OUTPUTS, TwinError, Vehicle, with_noise
 from twin.logs.map import LogMap
 from twin.logs.units import GRAVITY
@@ -222,9 +222,18 @@ def test_torques_that_never_change_are_none(drive):
     inputs = drive.inputs.copy()
     inputs[:, 1:9] = 100.0
     names = measured([drive.replace(inputs=inputs)])
-    assert not names & set(TORQUES)
+    assert not names & {name for name in TORQUES if name.startswith("drive")}
     assert "steering_wheel_angle" in names
     assert set(TORQUES) < measured([drive])
+
+
+def test_brakes_that_the_map_declares_are_not_known_and_no_mass_is_estimated(drive):
+    constants = [name for name in TORQUES if name.startswith("brake")]
+    settings = drive.settings | {"log": {"constants": constants}}
+    inputs = drive.inputs.copy()
+    inputs[:, 5:9] = 0.0
+    names = measured([drive.replace(inputs=inputs, settings=settings)])
+    assert lacking("mass", names) == constants
 
 
 def as_json(drive, samples):

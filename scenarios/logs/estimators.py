@@ -15,7 +15,7 @@ from estimators.til.stream import rolling_radius
 from scenarios.logs.default_observer import default_observer
 from scenarios.logs.follower import driven
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
-from twin import LOAD, OUTPUTS, SCALES, Drive, Twin, TwinError, Vehicle
+from twin import LOAD, OUTPUTS, SCALES, WHEELS, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -103,6 +103,11 @@ def joint(vehicle: Vehicle, log: Prepared) -> Found:
         raise TwinError("the joint estimator takes no gaps of this length; allowed: til")
     piece = Drive.joined(log.pieces)
     names = measured(log.pieces)
+    if any(f"brake_torque_{wheel}" not in names for wheel in WHEELS):
+        raise TwinError(
+            "the joint estimator needs brake torques, which the map declares constant; allowed: "
+            "--estimator til"
+        )
     noise = np.where(
         [name in names for name in OUTPUTS], noise_of_record(piece.measurements), np.nan
     )

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from estimators.speed_follower import TORQUES
 from estimators.til.stream import FASTEST, LONGEST_GAP, LONGEST_STEP
 from twin import INPUTS, OUTPUTS, WHEELS, Drive, TwinError
-from twin.logs.mapped_log import NEEDS
+from twin.logs.mapped_log import NEEDS, with_all_wheels
 from twin.logs.resampling import resample
 
 Array = NDArray[np.float64]
 ROAD = tuple(f"road_height_{wheel}" for wheel in WHEELS)
+DRIVE_TORQUES = tuple(f"drive_torque_{wheel}" for wheel in WHEELS)
 WHEEL_SPEEDS = tuple(f"wheel_speed_{wheel}" for wheel in WHEELS)
 SPEED = "vx or the wheel speeds"
 _START = 0.05  # [s] over which the speed at the start is averaged; chosen
@@ -57,19 +58,17 @@ def prepared(drive: Drive, dt: float) -> Prepared:
 def measured(pieces: Sequence[Drive]) -> set[str]:
     """Names of the measurements that there are, and of inputs that no map declares constant.
 
-    Torques that never change tell nothing, wherever they come from.
+    Drive torques that never change say nothing, wherever they come from.
     """
     names = set()
     for piece in pieces:
         finite = np.asarray(np.isfinite(piece.measurements).any(axis=0))
         names |= {name for name, there in zip(piece.output_names, finite, strict=True) if there}
         moving = np.atleast_1d(np.ptp(piece.inputs, axis=0) > 0.0)
-        declared = (*TORQUES, *piece.settings.get("log", {}).get("constants", ()))
+        declared = (*DRIVE_TORQUES, *piece.settings.get("log", {}).get("constants", ()))
         moving |= [name not in declared for name in piece.input_names]
         names |= {name for name, there in zip(piece.input_names, moving, strict=True) if there}
-    if any(name in names for name in TORQUES):
-        names |= set(TORQUES)  # a driven axle alone says as much
-    return names
+    return with_all_wheels(names)
 
 
 def lacking(quantity: str, names: set[str]) -> list[str]:

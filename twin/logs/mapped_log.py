@@ -1,6 +1,6 @@
 """A log of anybody becomes a `Drive` by its map, and says what was done to it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from pathlib import Path
 
 import numpy as np
@@ -227,15 +227,29 @@ def _about_missing(columns: Mapping[str, Array]) -> list[str]:
 def _about_estimates(columns: Mapping[str, Array], log_map: LogMap) -> list[str]:
     """What cannot be estimated, and which channel it wants."""
     known = {name for name, values in columns.items() if np.isfinite(values).any()}
-    known -= set(log_map.constants)
+    known = with_all_wheels(known - set(log_map.constants))
     if "vx" in known or all(name in known for name in OUTPUTS if name.startswith("wheel_speed")):
         known.add(_SPEED)
     sentences = []
     for quantity, needed in NEEDS.items():
         lacking = dict.fromkeys(_of_all_wheels(name) for name in needed if name not in known)
         if lacking:
-            sentences.append(f"{quantity} cannot be estimated without {', '.join(lacking)}.")
+            weigh = " `til weigh` needs no brakes." if list(lacking) == ["brake_torque_*"] else ""
+            sentences.append(f"{quantity} cannot be estimated without {', '.join(lacking)}.{weigh}")
     return sentences
+
+
+def with_all_wheels(names: Set[str]) -> set[str]:
+    """The names, and those of the axles that are not driven or not braked.
+
+    One axle's torques are all there are where the others' are declared zero. Brake torques that are
+    all declared are not known: a car that nobody saw brake has brakes all the same.
+    """
+    found = set(names)
+    for kind in ("drive_torque", "brake_torque"):
+        if any(name.startswith(kind) for name in names):
+            found |= {name for name in TORQUES if name.startswith(kind)}
+    return found
 
 
 def _of_all_wheels(name: str) -> str:
