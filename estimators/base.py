@@ -31,6 +31,7 @@ class Estimate:
         sensor_errors: (N, b) estimated biases, delay and position of the sensors.
         sd: (N, p) standard deviations of `estimated`; None if the estimator has none.
         states_sd: (N, nx) standard deviations of the states; None if the estimator has none.
+        sideslip_sd: (N,) standard deviation of the sideslip [rad]; None if the estimator has none.
         valid: (N, p) whether each of `estimated` may be relied on; None if it is not assessed.
         reason: (N, p) index into `reasons`: why a value is not valid.
         trustworthy: (N,) false while measurements in use are rejected or missing, and for a while
@@ -55,6 +56,7 @@ class Estimate:
     sensor_errors: Array | None = None
     sd: Array | None = None
     states_sd: Array | None = None
+    sideslip_sd: Array | None = None
     valid: NDArray[np.bool_] | None = None
     reason: NDArray[np.uint8] | None = None
     trustworthy: NDArray[np.bool_] | None = None
@@ -126,12 +128,13 @@ class Estimate:
         return np.arctan2(vy, np.maximum(vx, SLOWEST))
 
 
-def sideslip_estimate(time: Array, sideslip: Array) -> Estimate:
+def sideslip_estimate(time: Array, sideslip: Array, sd: Array | None = None) -> Estimate:
     """An estimate of the sideslip alone.
 
     Args:
         time: (N,) [s].
         sideslip: (N,) [rad].
+        sd: (N,) its standard deviation [rad]; None: there is none.
     """
     nothing = np.empty((time.size, 0))
     return Estimate(
@@ -145,6 +148,7 @@ def sideslip_estimate(time: Array, sideslip: Array) -> Estimate:
         parameter_names=(),
         output_names=("sideslip",),
         extended_names=(),
+        sideslip_sd=sd,
     )
 
 

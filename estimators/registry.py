@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from estimators.base import Estimator
 from estimators.benchmarks import (
+    bicycle_ekf,
     double_track,
     kalman_bucy,
     kalman_bucy_ode,
@@ -14,12 +15,14 @@ from estimators.ensemble import offline_fit, staged, unscented
 from estimators.entry import Entry, Given
 from estimators.joint import observer as joint
 from estimators.til import observer as til
+from estimators.til import scheduled
 from twin import TwinError
 
 ESTIMATORS: dict[str, Entry] = {
     entry.name: entry
     for entry in (
         *til.ENTRIES,
+        scheduled.ENTRY,
         joint.ENTRY,
         staged.ENTRY,
         unscented.ENTRY,
@@ -28,6 +31,7 @@ ESTIMATORS: dict[str, Entry] = {
         kalman_bucy_ode.ENTRY,
         double_track.ENTRY,
         single_track.ENTRY,
+        bicycle_ekf.ENTRY,
         static_map.ENTRY,
     )
 }

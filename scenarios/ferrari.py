@@ -22,11 +22,11 @@ from estimators.entry import Given
 from estimators.speed_follower import SpeedFollower
 from scenarios.calibration import calibrate
 from scenarios.calibration.calibrate import cut
-from scenarios.calibration.candidate import Candidate
 from scenarios.calibration.ferrari_log import PARTS, data_file, load, part
 from scenarios.experiment.experiment import Case, Experiment, Recipe, Run, Score, Trial
 from scenarios.experiment.metrics import rms
 from scenarios.experiment.result import Result
+from scenarios.logs.candidate import Candidate
 from scenarios.report.pictures import figure
 from twin import Drive, TwinError, Vehicle
 
@@ -85,17 +85,6 @@ class _WholeDrive:
         return self.of(drive)
 
 
-def _calibrated(drive: Drive) -> Estimate:
-    """The calibrated twin's, with the sideslip of the point where it is measured."""
-    candidate = calibrated()
-    found = candidate.run(drive)
-    return replace(
-        found,
-        outputs=np.column_stack([found.outputs, candidate.sideslip(found)]),
-        output_names=(*found.output_names, "sideslip"),
-    )
-
-
 def _zero(drive: Drive) -> Estimate:
     """No sideslip at all: what every estimator has to beat."""
     return sideslip_estimate(drive.time, np.zeros(len(drive)))
@@ -124,7 +113,7 @@ def _static_map(run: Run, drive: Drive, given: Given) -> Given:
 
 
 RECIPES = {
-    "til": Recipe(estimator="til", make=lambda run, drive: _WholeDrive(_calibrated)),
+    "til": Recipe(estimator="til", make=lambda run, drive: _WholeDrive(calibrated().observe)),
     "single-track": Recipe(estimator="single-track", complete=_single_track),
     "static-map": Recipe(estimator="static-map", complete=_static_map),
     "zero": Recipe(estimator="zero", make=lambda run, drive: _WholeDrive(_zero)),

@@ -8,10 +8,10 @@ from estimators.speed_follower import TORQUES
 from scenarios.__main__ import main
 from scenarios.calibration import calibrate
 from scenarios.calibration.calibrate import Task, residuals
-from scenarios.calibration.candidate import Candidate
-from scenarios.calibration.free_parameters import FREE
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
+from scenarios.logs.candidate import Candidate
+from scenarios.logs.free_parameters import FREE
 from twin import OUTPUTS, TwinError, Vehicle
 
 FACTORS = {"front_cornering_stiffness": 0.85, "rear_cornering_stiffness": 1.2}

@@ -5,10 +5,10 @@ import pytest
 
 from scenarios.__main__ import main
 from scenarios.calibration import calibrate
-from scenarios.calibration.candidate import Candidate
 from scenarios.driving.joint_drives import mixed
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
+from scenarios.logs.candidate import Candidate
 from twin import LOAD, Twin, TwinError, Vehicle, parameter_deltas, with_noise
 
 SUV = Vehicle.load("suv")

@@ -6,6 +6,7 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from estimators.speed_follower import TORQUES
@@ -181,7 +182,10 @@ def test_log_without_torques_gives_sideslip_but_no_mass_and_says_so(tmp_path, dr
     found = {(row.quantity, row.metric): row.median for row in outcome.rows}
     assert ("mass", "final") not in found
     assert found["sideslip", "rmse"] < 0.05
+    assert found["sideslip", "rmse"] < 2.0 * found["sideslip", "sd"] < 4.0
     assert found["vx", "rmse"] < 0.1
+    history = pq.read_table(tmp_path / "bare.til.parquet")
+    assert (history["sideslip_sd"].to_numpy() > 0.0).mean() > 0.99
     assert any(line.startswith("mass cannot be estimated without drive_t") for line in outcome.done)
 
 

@@ -6,11 +6,11 @@ import pytest
 from scenarios import ferrari
 from scenarios.__main__ import main
 from scenarios.calibration import ferrari_log
-from scenarios.calibration.free_parameters import FREE
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
 from scenarios.experiment import engine
 from scenarios.experiment.engine import draw, estimate_on, run_experiment, runs
+from scenarios.logs.free_parameters import FREE
 from twin import Twin, TwinError, Vehicle
 
 HAS_LOG = bool(os.environ.get(ferrari_log.VARIABLE))

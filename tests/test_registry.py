@@ -5,6 +5,7 @@ from cars import drive_of_other_car
 from estimators import registry
 from estimators.base import Estimate, Estimator, OnlineEstimator, sideslip_estimate
 from estimators.benchmarks import double_track
+from estimators.benchmarks.bicycle_ekf import Bicycle
 from estimators.benchmarks.single_track import START, Geometry
 from estimators.benchmarks.static_map import StaticMap
 from estimators.entry import Entry, Given
@@ -41,6 +42,8 @@ def given_for(name, noise):
         "staged": Given(vehicle=SUV, noise_sd=noise, laws=STAGED_LAWS),
         "unscented": Given(vehicle=SUV, noise_sd=noise, parameters=few),
         "least-squares": Given(vehicle=SUV, noise_sd=noise, parameters=("mass",)),
+        "til-scheduled": Given(vehicle=SUV),
+        "bicycle-ekf": Given(model=Bicycle(1000.0, 1.3, 1.1, 1300.0, steering_ratio=16.0)),
         "double-track": Given(
             model=double_track.load(double_track_fit.path("sports_car")),
             settings=double_track.Gains(0.0, 0.0, 0.0, 0.0),

@@ -19,8 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from estimators.base import Estimate
+from estimators.entry import Entry
 from estimators.least_squares import Fit, fit
 from twin import Drive, TwinError
 
@@ -127,6 +129,49 @@ def run(bicycle: Bicycle, drive: Drive) -> Sideslip:
     numbers = Bicycle(*(float(value) for value in bicycle))  # one type, one compilation
     _run(numbers, drive.dt, np.ascontiguousarray(steering), measured, out)
     return Sideslip(*np.ascontiguousarray(out.T))
+
+
+class BicycleFilter:
+    """The filter over drives with steering_wheel_angle, vx, yaw_rate and ay.
+
+    Args:
+        bicycle: its numbers.
+    """
+
+    def __init__(self, bicycle: Bicycle) -> None:
+        self.bicycle = bicycle
+
+    def reset(
+        self,
+        speed: float,
+        parameters: Mapping[str, float] | None = None,
+        road: ArrayLike | None = None,
+    ) -> None:
+        """Nothing to reset: each drive begins straight ahead at its first yaw rate."""
+
+    def run(self, drive: Drive) -> Estimate:
+        """Sideslip, lateral speed and yaw rate over a whole drive, with standard deviations.
+
+        Raises:
+            TwinError: the drive lacks a channel.
+        """
+        found = run(self.bicycle, drive)
+        vx = drive.channel("vx")
+        nothing = np.empty((len(drive), 0))
+        return Estimate(
+            time=drive.time,
+            states=np.column_stack([vx, vx * np.tan(found.sideslip), found.yaw_rate]),
+            states_sd=np.column_stack([np.full_like(vx, np.nan), vx * found.sd, found.yaw_rate_sd]),
+            parameters=nothing,
+            outputs=found.sideslip[:, None],
+            extended=nothing,
+            nominal=np.empty(0),
+            state_names=("vx", "vy", "yaw_rate"),
+            parameter_names=(),
+            output_names=("sideslip",),
+            extended_names=(),
+            sideslip_sd=found.sd,
+        )
 
 
 def fit_filter(
@@ -282,3 +327,13 @@ def _run(car, dt, steering, measured, out):
             p[:] = step @ p @ step.T
             for i in range(4):
                 p[i, i] += h * noise[i]
+
+
+ENTRY = Entry(
+    name="bicycle-ekf",
+    words="sideslip by an extended Kalman filter over a dynamic bicycle model with disturbances",
+    make=lambda given: BicycleFilter(given.model),
+    needs=frozenset(("model",)),
+    channels=("yaw_rate", "ay", "vx"),
+    gives=("sideslip",),
+)

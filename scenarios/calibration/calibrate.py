@@ -2,11 +2,12 @@
 
 The twin runs over the log and its outputs are compared with the measured ones; bounded least
 squares over such black-box runs changes what the user has freed
-(`scenarios.calibration.free_parameters`). What
+(`scenarios.logs.free_parameters`). What
 comes out is a TOML file with values, confidence intervals and where they come from.
 """
 
 import hashlib
+import math
 import os
 import time
 from collections.abc import Mapping, Sequence
@@ -21,11 +22,11 @@ from numpy.typing import NDArray
 import models
 from estimators.least_squares import Fit, fit
 from estimators.speed_follower import TORQUES
-from scenarios.calibration.candidate import Candidate
-from scenarios.calibration.free_parameters import FREE, starts
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Result, Row, replacing, versions
+from scenarios.logs.candidate import Candidate
 from scenarios.logs.follower import driven
+from scenarios.logs.free_parameters import BAND, FREE, NOISES, starts
 from scenarios.logs.pieces import prepared
 from twin import OUTPUTS, WHEEL_SPEEDS, Drive, TwinError, Vehicle
 from twin.car.signals import signals_of
@@ -43,6 +44,7 @@ HELD_OUT = 0.25  # of each log, at its end, that the result is scored on; chosen
 RATE = 20.0  # [Hz] at which residuals are taken: above what a driver excites
 BLOCK = 2.0  # [s], see `estimators.least_squares`; chosen: some times the memory of a car
 MEMORY = 0.5  # [s], of residuals: what a sample says against a prior; chosen
+_NORMAL_95 = 1.96
 LARGEST = 20.0  # of a residual, and of all residuals of a twin that blows up
 
 
@@ -112,6 +114,8 @@ def check(task: Task) -> None:
         TwinError: nothing is free, a signal is unknown or not measured, the drive is too coarse, or
             the mass is to be found from a speed that is followed.
     """
+    if BAND in task.free:
+        raise TwinError(f"calibrate: {BAND} is free; allowed: others, it follows from the errors")
     if not task.free:
         raise TwinError(f"calibrate: nothing is free; allowed: {', '.join(FREE)}")
     if not task.drives:
@@ -176,7 +180,9 @@ def task_of(
 ) -> tuple[Task, tuple[Drive, ...]]:
     """A task of the command line: the twin runs free, but for gains that are freed.
 
-    A constant offset of each fitted signal of an IMU is freed along.
+    A constant offset of each fitted signal of an IMU is freed along. Where the sideslip is measured
+    and torques are not, the twin runs in the observer that `til estimate` uses, and the noises of
+    that are freed along.
 
     Args:
         logs: recorded drives, read as `til estimate` reads them.
@@ -206,9 +212,16 @@ def task_of(
     blocks = sum(len(piece) for piece in used) * dt / BLOCK
     if not free or blocks <= len(free) + len(offsets) + 1:  # too short a drive for more
         offsets = []
+    follows = any(not set(TORQUES) & set(piece.input_names) for piece in used)
+    scheduled = follows and "sideslip" in signals
     task = Task(
-        candidate=Candidate(vehicle=car, follower=driven(car)),
-        free=tuple(dict.fromkeys((*free, *offsets))),
+        candidate=Candidate(
+            vehicle=car,
+            values={name: value for name, value in car.calibration if name in FREE},
+            follower=driven(car),
+            scheduled=scheduled,
+        ),
+        free=tuple(dict.fromkeys((*free, *offsets, *(NOISES if scheduled else ())))),
         signals=tuple(signals),
         drives=tuple(used),
     )
@@ -258,6 +271,7 @@ def run(
     """
     start = time.perf_counter()
     found = calibrate(task, jobs=jobs, evaluations=evaluations)
+    task = _with_band(task, found.values)
     write(path, task, logs, found)
     return Result(
         name="calibrate",
@@ -271,6 +285,26 @@ def run(
         seconds=time.perf_counter() - start,
         rows=[*_rows(task, found), *_held_out(task, found, held_out)],
     )
+
+
+def _with_band(task: Task, values: Array) -> Task:
+    """The task with the factor on the observer's standard deviations that its errors ask for.
+
+    95 % of the errors of the sideslip are then below twice the standard deviation.
+    """
+    candidate = task.at(values)
+    if not candidate.scheduled or "sideslip" not in task.signals:
+        return task
+    scaled = []
+    for drive in task.drives:
+        found = candidate.run(drive)
+        assert found.sideslip_sd is not None
+        error = np.abs(candidate.sideslip(found) - drive.truth["sideslip"])
+        scaled.append(error / np.maximum(found.sideslip_sd, 1e-9))
+    band = max(float(np.nanquantile(np.concatenate(scaled), 0.95)) / _NORMAL_95, 1e-3)
+    band_before = task.candidate.values.get(BAND, 0.0)
+    known = {**task.candidate.values, BAND: band_before + math.log(band)}
+    return replace(task, candidate=replace(task.candidate, values=known))
 
 
 def _held_out(task: Task, found: Fit, drives: Sequence[Drive]) -> list[Row]:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimators.speed_follower import SpeedFollower
 from estimators.til.law import ParameterLaw
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
@@ -45,7 +44,6 @@ def default_observer(
     measured: Set[str],
     *,
     mass: bool = True,
-    follower: SpeedFollower | None = None,
 ) -> Default:
     """The guarded observer of a vehicle whose log measures these outputs.
 
@@ -53,7 +51,6 @@ def default_observer(
         vehicle: of the twin.
         measured: names of what the log measures.
         mass: whether the log's torques and accelerations can tell it.
-        follower: of the speed, for a log without torques.
 
     Raises:
         TwinError: the vehicle's files are missing or broken.
@@ -72,7 +69,7 @@ def default_observer(
     left_out = [f"Without {name} the twin is not corrected by it." for name in missing]
     laws = [mass_law(twin, radius, measured)] if mass else []
     return Default(
-        observer=Observer(twin, laws, gains, guarded=True, follower=follower),
+        observer=Observer(twin, laws, gains, guarded=True),
         rolling_radius=radius,
         parameters=tuple(law.parameter for law in laws),
         left_out=tuple(left_out),

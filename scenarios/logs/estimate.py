@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from estimators.score import rms_pct
 from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Result, Row, json_text, replacing, versions
+from scenarios.logs.candidate import SLOWEST
 from scenarios.logs.estimators import ESTIMATORS, Found, unit_of
 from scenarios.logs.findings import Finding, findings, hills
 from scenarios.logs.pieces import lacking, measured, prepared
@@ -32,7 +33,6 @@ from twin.toml_file import reason
 
 Array = NDArray[np.float64]
 
-SLOWEST = 1.0  # [m/s]; below it sideslip is reckoned as at this speed, as its angle means nothing
 _LEAST_HILL = 0.1  # [m/s2]; what is less is noise and pitching
 # Of the mass, for each m/s2 of hills: twice of what 12 drives of the SUV were off in sines of 1 to
 # 6 % and 25 to 60 s
@@ -252,6 +252,13 @@ def _rows(task: Task, found: Found) -> list[Row]:
         slip = np.degrees(sideslip(found))
         add("sideslip", "final", "deg", float(slip[-1]))
         add("sideslip", "largest", "deg", float(np.abs(slip).max()))
+        if estimate.sideslip_sd is not None:
+            add(
+                "sideslip",
+                "sd",
+                "deg",
+                float(np.degrees(np.sqrt(np.mean(estimate.sideslip_sd**2)))),
+            )
         if "sideslip" in drive.truth:
             add("sideslip", "rmse", "deg", _rmse(slip, np.degrees(drive.truth["sideslip"]), found))
     add("vx", "final", "m/s", float(estimate["vx"][-1]))
@@ -263,8 +270,10 @@ def _rows(task: Task, found: Found) -> list[Row]:
 
 
 def sideslip(found: Found) -> Array:
-    """(N,) of the twin's IMU [rad]."""
+    """(N,) of the twin's IMU, or of the point where a calibration measured it [rad]."""
     estimate = found.estimate
+    if "sideslip" in estimate.output_names:
+        return estimate["sideslip"]
     return np.arctan2(estimate["vy"], np.maximum(estimate["vx"], SLOWEST))
 
 
@@ -272,6 +281,18 @@ def _rmse(estimate: Array, truth: Array, found: Found) -> float:
     """Where the car moves and the truth is known."""
     good = np.isfinite(truth) & (found.estimate["vx"] > SLOWEST)
     return float(np.sqrt(np.mean((estimate - truth)[good] ** 2))) if good.any() else float("nan")
+
+
+def _band(found: Found) -> float:
+    """Standard deviation of the sideslip where the car moves, rms [deg]."""
+    estimate = found.estimate
+    assert estimate.sideslip_sd is not None
+    moves = estimate["vx"] > SLOWEST
+    return (
+        float(np.degrees(np.sqrt(np.mean(estimate.sideslip_sd[moves] ** 2))))
+        if moves.any()
+        else math.nan
+    )
 
 
 def _at_end(found: Found) -> bool | None:
@@ -300,6 +321,8 @@ def _write_history(task: Task, found: Found) -> None:
     estimate = found.estimate
     names = dict.fromkeys((*found.parameters, *_KEPT))
     columns: dict[str, Any] = {"time": estimate.time, "sideslip": sideslip(found)}
+    if estimate.sideslip_sd is not None:
+        columns["sideslip_sd"] = estimate.sideslip_sd
     columns |= {name: estimate[name] for name in names}
     if estimate.trustworthy is not None:
         columns["trustworthy"] = estimate.trustworthy

@@ -1,7 +1,7 @@
 """The estimators that recorded drives are given to."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +12,10 @@ from estimators.joint.noise import noise_of_record
 from estimators.joint.observer import JointObserver, JointSettings
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
+from scenarios.logs.candidate import Candidate
 from scenarios.logs.default_observer import default_observer
 from scenarios.logs.follower import driven
+from scenarios.logs.free_parameters import FREE
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
 from twin import LOAD, OUTPUTS, SCALES, WHEELS, Drive, Twin, TwinError, Vehicle
 
@@ -41,15 +43,39 @@ class Found(NamedTuple):
 
 
 def til(vehicle: Vehicle, log: Prepared) -> Found:
-    """States and mass by the default observer.
+    """States and mass by the default observer; without torques the states, by scheduled gains.
 
     Raises:
         TwinError: an input is out of range, or the twin has blown up.
     """
+    return _scheduled(vehicle, log) if log.follows else _with_mass(vehicle, log)
+
+
+def _scheduled(vehicle: Vehicle, log: Prepared) -> Found:
+    """States and sideslip with a standard deviation, by what a calibration found of the log."""
+    candidate = Candidate(
+        vehicle=vehicle,
+        values={name: value for name, value in vehicle.calibration if name in FREE},
+        follower=driven(vehicle),
+        scheduled=True,
+    )
+    estimate = _joined([candidate.observe(piece) for piece in log.pieces])
+    missing = [name for name in ("ay", "yaw_rate") if name not in measured(log.pieces)]
+    return Found(
+        drive=Drive.joined(log.pieces),
+        estimate=estimate,
+        parameters=(),
+        sd={},
+        done=(
+            *(f"Without {name} the twin is not corrected by it." for name in missing),
+            *estimate.notes,
+        ),
+    )
+
+
+def _with_mass(vehicle: Vehicle, log: Prepared) -> Found:
     names = measured(log.pieces)
-    wanted = lacking("mass", names)
-    follower = driven(vehicle) if log.follows else None
-    default = default_observer(vehicle, names, mass=not wanted, follower=follower)
+    default = default_observer(vehicle, names, mass=not lacking("mass", names))
     estimates = []
     for piece in log.pieces:
         speed = start_speed(piece, default.rolling_radius)
@@ -129,15 +155,11 @@ def unit_of(parameter: str) -> str:
 
 
 def _joined(estimates: Sequence[Estimate]) -> Estimate:
-    def all_of(name: str) -> Array:
-        return np.concatenate([getattr(estimate, name) for estimate in estimates])
-
-    return Estimate(
-        time=all_of("time"),
-        states=all_of("states"),
-        parameters=all_of("parameters"),
-        outputs=all_of("outputs"),
-        extended=all_of("extended"),
-        nominal=estimates[0].nominal,
-        trustworthy=all_of("trustworthy").astype(np.bool_),
-    )
+    """Estimates over consecutive pieces as one."""
+    first, together = estimates[0], {}
+    for field in fields(first):
+        value = getattr(first, field.name)
+        if isinstance(value, np.ndarray) and field.name != "nominal":
+            together[field.name] = np.concatenate([getattr(one, field.name) for one in estimates])
+    notes = tuple(note for one in estimates for note in one.notes)
+    return replace(first, **together, notes=notes)

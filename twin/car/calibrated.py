@@ -6,7 +6,8 @@
     [values.mass]                         # a delta of `twin.LOAD`
     value = 85.0
 
-`til calibrate` writes it; what else stands in it (intervals, gains, offsets) is for people.
+`til calibrate` writes it. Other values (offsets of sensors, noises of an observer) belong to logs
+and observers: they are kept with the vehicle, which does not read them.
 """
 
 from pathlib import Path
@@ -24,11 +25,13 @@ class Calibrated(NamedTuple):
         base: the car's name or file.
         scales: factors of `VEHICLE_SCALES`.
         deltas: of `LOAD`.
+        further: all other values by name.
     """
 
     base: str
     scales: dict[str, float]
     deltas: dict[str, float]
+    further: dict[str, float]
 
 
 def calibrated_of(path: Path, table: Table) -> Calibrated | None:
@@ -40,18 +43,13 @@ def calibrated_of(path: Path, table: Table) -> Calibrated | None:
     base = table.values.get("vehicle")
     if not isinstance(base, str):
         return None
-    scales, deltas = {}, {}
-    for name, value in table.table("fixed").values.items():
-        _put(name, float(value), scales, deltas)
+    values = {name: float(value) for name, value in table.table("fixed").values.items()}
     for name, entry in table.table("values").tables():
-        _put(name, entry.number("value", 0.0, -1e6, 1e6), scales, deltas)
+        values[name] = entry.number("value", 0.0, -1e6, 1e6)
     beside = path.parent / base
-    return Calibrated(str(beside) if beside.is_file() else base, scales, deltas)
-
-
-def _put(name: str, value: float, scales: dict[str, float], deltas: dict[str, float]) -> None:
-    """Sorts a value in; offsets and gains belong to logs and observers."""
-    if name in VEHICLE_SCALES:
-        scales[name] = value
-    elif name in LOAD:
-        deltas[name] = value
+    return Calibrated(
+        base=str(beside) if beside.is_file() else base,
+        scales={name: value for name, value in values.items() if name in VEHICLE_SCALES},
+        deltas={name: value for name, value in values.items() if name in LOAD},
+        further={n: v for n, v in values.items() if n not in VEHICLE_SCALES and n not in LOAD},
+    )

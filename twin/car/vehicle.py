@@ -44,12 +44,14 @@ class Vehicle:
         loads: point masses fixed to the chassis as bodies of their own.
         scales: what differs from the files by a factor, see `scaled`.
         deltas: what the chassis differs in from the files, see `changed`.
+        calibration: what a calibration found beyond the car, by name: offsets of sensors, noises.
     """
 
     source: Path
     loads: tuple[PointMass, ...] = ()
     scales: tuple[tuple[str, float], ...] = ()
     deltas: tuple[tuple[str, float], ...] = ()
+    calibration: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def load(cls, name: str | Path) -> "Vehicle":
@@ -65,7 +67,8 @@ class Vehicle:
             found = calibrated_of(source, read_toml(source))
             if found is not None:
                 base = cls.load(found.base)
-                return base.scaled(**found.scales).changed(**found.deltas)
+                car = base.scaled(**found.scales).changed(**found.deltas)
+                return replace(car, calibration=tuple(found.further.items()))
         vehicle = cls(source=source)
         vehicle.compile()
         return vehicle

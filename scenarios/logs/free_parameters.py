@@ -2,7 +2,7 @@
 
 Most are factors on what a car's files say (`Vehicle.scaled`), some are parameters of a running twin
 (deltas from the nominal chassis). The rest belongs to the log and to the observer: offsets of
-its sensors, how the unknown torques are made, gains.
+its sensors, how the unknown torques are made, gains, noises that a covariance is driven by.
 """
 
 import math
@@ -10,13 +10,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from estimators.til.scheduled_kernel import Noise
 from twin import OUTPUTS, PARAMETER, RATES, TwinError
 from twin.parameters import LARGEST_SCALE, LEAST_SCALE
 from twin.scales import VEHICLE_SCALES
 
 SCALE_SD = 0.25  # prior of a factor; chosen: a data sheet's tyres, springs and dampers
 
-Kind = Literal["scale", "load", "offset", "follower", "gain"]
+# Of a noise's natural logarithm: a factor of 2.7, chosen; the bounds are a thousandfold
+LOG_SD, LARGEST_LOG = 1.0, 7.0
+
+Kind = Literal["scale", "load", "offset", "follower", "gain", "noise"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +29,8 @@ class Free:
 
     Attributes:
         kind: of what: a factor on the vehicle's files; a delta of the twin's chassis; an offset
-            that is added to a channel; a field of `SpeedFollower`; a gain.
+            that is added to a channel; a field of `SpeedFollower`; a gain; the natural logarithm of
+            a field of `Noise` over its default.
         unit: of the number.
         start: where it is not given.
         low, high: bounds.
@@ -71,6 +76,18 @@ def _gain(unit: str, start: float, low: float, high: float, of: tuple[str, str])
     )
 
 
+def _noise() -> Free:
+    return Free(
+        kind="noise", unit="1", start=0.0, low=-LARGEST_LOG, high=LARGEST_LOG, scale=0.5,
+        prior_sd=LOG_SD,
+    )  # fmt: skip
+
+
+# How far the twin of a corrected observer is from the car, and its sensors from the truth
+_NOISE = "log_noise_"
+NOISES = tuple(f"{_NOISE}{name}" for name in ("vy", "yaw_rate", "front", "rear", "ay"))
+BAND = f"{_NOISE}band"  # factor on the standard deviations; follows from the errors
+
 # Bounds are chosen: wide for a passenger car whose files are roughly right.
 FREE: Mapping[str, Free] = {
     **{name: _scale() for name in VEHICLE_SCALES},
@@ -105,7 +122,16 @@ FREE: Mapping[str, Free] = {
     "yaw_rate_to_yaw_rate": _gain("1/s", 20.0, 0.0, 100.0, ("yaw_rate", "yaw_rate")),
     "yaw_rate_to_vy": _gain("m/s per rad", 0.0, -50.0, 50.0, ("vy", "yaw_rate")),
     "ay_to_vy": _gain("1", 0.0, 0.0, 0.95, ("vy", "ay")),
+    **{name: _noise() for name in NOISES},
+    BAND: _noise(),
 }
+
+
+def noise_of(values: Mapping[str, float]) -> Noise:
+    """The noise of an observer, by the values of a calibration; the default's where it has none."""
+    default = Noise()
+    logs = {n.removeprefix(_NOISE): v for n, v in values.items() if n.startswith(_NOISE)}
+    return default._replace(**{n: getattr(default, n) * math.exp(v) for n, v in logs.items()})
 
 
 def starts(names: tuple[str, ...], given: Mapping[str, float]) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """A candidate of a calibration: a twin with some numbers changed, and its run over a drive."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 from estimators.base import Estimate
 from estimators.speed_follower import SpeedFollower
 from estimators.til.observer import Observer
-from scenarios.calibration.free_parameters import FREE, Kind
+from estimators.til.scheduled import ScheduledObserver
+from scenarios.logs.free_parameters import FREE, Kind, noise_of
 from scenarios.logs.pieces import start_speed
 from twin import Drive, Twin, Vehicle
 
 Array = NDArray[np.float64]
+
+SLOWEST = 1.0  # [m/s]; slower, sideslip is reckoned as at this speed, as its angle means nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,12 +28,14 @@ class Candidate:
         values: what is changed, by name.
         gains: of the observer that the twin runs in; none: it runs free.
         follower: for drives without torques.
+        scheduled: whether gains follow from a covariance instead.
     """
 
     vehicle: Vehicle
     values: Mapping[str, float] = field(default_factory=dict)
     gains: Mapping[tuple[str, str], float] = field(default_factory=dict)
     follower: SpeedFollower | None = None
+    scheduled: bool = False
 
     def of(self, kind: Kind) -> dict[str, float]:
         """The values of one kind."""
@@ -42,22 +47,38 @@ class Candidate:
         Raises:
             TwinError: the twin has blown up, or the drive has not what it needs.
         """
-        gains = {**self.gains, **{FREE[n].of: value for n, value in self.of("gain").items()}}
         follower = self.follower and self.follower._replace(**self.of("follower"))
         twin = Twin(self.vehicle.scaled(**self.of("scale")))
-        observer = Observer(twin, (), gains, follower=follower)
+        if self.scheduled:
+            observer = ScheduledObserver(twin, follower, noise_of(self.values))
+        else:
+            gains = {**self.gains, **{FREE[n].of: value for n, value in self.of("gain").items()}}
+            observer = Observer(twin, (), gains, follower=follower)
         radius = float(np.mean(self.vehicle.figures.wheel_radius))
         observer.reset(_first_speed(drive, radius), self.of("load"))
-        return observer.run(self._shifted(drive))
+        return observer.run(self.shifted(drive))
+
+    def observe(self, drive: Drive) -> Estimate:
+        """The same, with the sideslip of the point where it is measured among the outputs.
+
+        Raises:
+            TwinError: see `run`.
+        """
+        found = self.run(drive)
+        return replace(
+            found,
+            outputs=np.column_stack([found.outputs, self.sideslip(found)]),
+            output_names=(*found.output_names, "sideslip"),
+        )
 
     def sideslip(self, estimate: Estimate) -> Array:
         """(N,) of the point where it is measured, with the offset of that measurement [rad]."""
         lever = self.values.get("sideslip_lever", 0.0)
         vy = estimate["vy"] + lever * estimate["yaw_rate"]
-        angle = np.arctan2(vy, np.maximum(estimate["vx"], 1e-3))
+        angle = np.arctan2(vy, np.maximum(estimate["vx"], SLOWEST))
         return angle + self.values.get("sideslip_offset", 0.0)
 
-    def _shifted(self, drive: Drive) -> Drive:
+    def shifted(self, drive: Drive) -> Drive:
         """The drive less the offsets of its sensors."""
         inputs, measurements = drive.inputs.copy(), drive.measurements.copy()
         steering = drive.input_names.index("steering_wheel_angle")
