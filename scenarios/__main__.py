@@ -11,7 +11,14 @@ from typing import Any
 
 import click
 
-from scenarios.cli import car_commands, doctor, log_commands, study_commands, weigh_commands
+from scenarios.cli import (
+    car_commands,
+    doctor,
+    log_commands,
+    plan_command,
+    study_commands,
+    weigh_commands,
+)
 from scenarios.cli.options import Mistake
 from scenarios.cli.output import show_warning
 
@@ -78,6 +85,7 @@ for command in (
     *car_commands.COMMANDS,
     *log_commands.COMMANDS,
     *weigh_commands.COMMANDS,
+    *plan_command.COMMANDS,
     doctor.doctor,
 ):
     program.add_command(command)

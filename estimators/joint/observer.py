@@ -326,6 +326,17 @@ class JointObserver:
         )
 
     @property
+    def prior(self) -> Array:
+        """(p + b,) standard deviations of `estimated` before the first sample."""
+        return self._prior.copy()
+
+    @property
+    def segment_information(self) -> Array:
+        """(10, p + b, p + b) Fisher's of the segment that is being driven, by channel."""
+        upper = self._state.segment_information[min(int(self._state.evidence[FULL]), SEGMENTS - 1)]
+        return upper + np.swapaxes(np.triu(upper, 1), 1, 2)
+
+    @property
     def covariance(self) -> Array:
         """(p + b, p + b) of `estimated`, now, errors of the model included."""
         return self._state.covariance * max(float(self._state.widening[0]), 1.0)

@@ -142,6 +142,11 @@ def weigh() -> tuple[Any, Callable[[str], Any]]:
     ).parse
 
 
+def planning() -> Any:
+    """The module that plans manoeuvres."""
+    return import_module("scenarios.planning.report")
+
+
 def calibrate() -> Any:
     """The module that fits a twin to a log."""
     return import_module("scenarios.calibration.calibrate")

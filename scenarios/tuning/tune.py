@@ -57,12 +57,16 @@ class Tuned:
         predicted: the point that the last surrogate has for best.
         cost: of the best point tried.
         evaluations: how many.
+        points: of all of them, in order, gains by name.
+        costs: (evaluations,) what they cost, at most the objective's worst.
     """
 
     evaluated: dict[str, float]
     predicted: dict[str, float]
     cost: float
     evaluations: int
+    points: tuple[dict[str, float], ...] = ()
+    costs: tuple[float, ...] = ()
 
 
 def with_bounds(
@@ -129,6 +133,8 @@ def search(objective: Objective, evaluations: int, jobs: int, journal: Path) -> 
         predicted=_named(objective, predicted),
         cost=min(costs),
         evaluations=len(points),
+        points=tuple(_named(objective, point) for point in points),
+        costs=tuple(costs),
     )
 
 
