@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 PARTS = 8  # of the drive, left out in turn; chosen
 AT_BOUND = 1e-3  # of the range between the bounds
-TOLERANCE = 1e-4  # of the cost, relatively: far below what a confidence interval shows
+TOLERANCE = 1e-3  # of the cost, relatively: far below what a confidence interval shows
 LEAST_INFORMATION = 1e-10  # relative; a direction below it cannot be told from the others
 
 

@@ -28,7 +28,7 @@ from scenarios.logs.candidate import Candidate
 from scenarios.logs.follower import driven
 from scenarios.logs.free_parameters import BAND, FREE, NOISES, starts
 from scenarios.logs.pieces import prepared
-from twin import OUTPUTS, WHEEL_SPEEDS, Drive, TwinError, Vehicle
+from twin import OUTPUTS, WHEEL_SPEEDS, Drive, Twin, TwinError, Vehicle
 from twin.car.signals import signals_of
 
 Array = NDArray[np.float64]
@@ -42,6 +42,7 @@ SIZES = {
 }
 HELD_OUT = 0.25  # of each log, at its end, that the result is scored on; chosen
 RATE = 20.0  # [Hz] at which residuals are taken: above what a driver excites
+INERTIA_SD = 0.3  # of the moments that the files say; chosen: rules by mass and size are as good
 BLOCK = 2.0  # [s], see `estimators.least_squares`; chosen: some times the memory of a car
 MEMORY = 0.5  # [s], of residuals: what a sample says against a prior; chosen
 _NORMAL_95 = 1.96
@@ -170,6 +171,22 @@ def calibrate(task: Task, *, jobs: int = 1, evaluations: int = 20) -> Fit:
     )
 
 
+def _as_driven(task: Task, found: Fit) -> tuple[Task, Fit]:
+    """Both with the load that the twin drove with: a rigid body's, which may have other moments."""
+    candidate = task.at(found.values)
+    load = candidate.of("load")
+    if not load:
+        return task, found
+    twin = Twin(candidate.vehicle.scaled(**candidate.of("scale")))
+    asked = [load.get(name, 0.0) for name in twin.parameters]
+    kept = dict(zip(twin.parameters, twin.set_parameters(asked).tolist(), strict=True))
+    lifted = {n: v for n, v in kept.items() if v != load.get(n, 0.0) and n not in task.free}
+    values = [kept.get(n, v) for n, v in zip(task.free, found.values.tolist(), strict=True)]
+    known = {**task.candidate.values, **lifted}
+    task = replace(task, candidate=replace(task.candidate, values=known))
+    return task, replace(found, values=np.array(values))
+
+
 def task_of(
     logs: Sequence[Path],
     map_path: Path | None,
@@ -224,8 +241,18 @@ def task_of(
         free=tuple(dict.fromkeys((*free, *offsets, *(NOISES if scheduled else ())))),
         signals=tuple(signals),
         drives=tuple(used),
+        prior_sd=_priors(car),
     )
     return task, tuple(piece for piece in held_out if len(piece) > 1)
+
+
+def _priors(vehicle: Vehicle) -> dict[str, float]:
+    """How far the inertia of a car is believed to lie from its file's: what a guess is worth."""
+    moments = np.diag(vehicle.chassis().inertia)
+    believed = {
+        f"J{axis}{axis}": INERTIA_SD * float(m) for axis, m in zip("xyz", moments, strict=True)
+    }
+    return {name: min(sd, FREE[name].prior_sd) for name, sd in believed.items()}
 
 
 def _between(drive: Drive, first: float | None, last: float | None) -> Drive:
@@ -271,6 +298,7 @@ def run(
     """
     start = time.perf_counter()
     found = calibrate(task, jobs=jobs, evaluations=evaluations)
+    task, found = _as_driven(task, found)
     task = _with_band(task, found.values)
     write(path, task, logs, found)
     return Result(

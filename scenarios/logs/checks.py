@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.5
 SLOPES = (0.8, 1.25)
+LAGS = (-0.1, 0.1)  # [s]
+_REAR_COMPLIANCE = 0.008  # [s2/m] of sideslip behind per lateral acceleration: 4.5 degrees per g
 _AX_SLOPES = (0.9, 1.25)  # gravity on the pitching body adds some 5 %
 _TYPICAL_TRACK = 1.55  # [m]
 TORQUES = "torques"  # stands for all of them where a name is shown
@@ -87,7 +89,7 @@ class Equation(NamedTuple):
     good: NDArray[np.bool_]
     least: float
     slopes: tuple[float, float] = SLOPES
-    lags: tuple[float, float] = (-0.1, 0.1)
+    lags: tuple[float, float] = LAGS
     unit: str = "1"
     alike: float = LEAST_CORRELATION
     either: bool = False
@@ -199,8 +201,10 @@ def _of_accelerations(signals: Signals, speed: str, car: CarFacts | None) -> Ite
             right=right,
             good=signals.where(*names, "speed"),
             least=0.2 / scale,
-            # without vy a quick steer lessens ay by the lateral motion of the body
+            # without vy a quick steer lessens ay by the lateral motion of the body, and ay comes
+            # later by the speed times what the rear tyres give way
             slopes=slopes if with_vy else (0.45 * slopes[0] / SLOPES[0], slopes[1]),
+            lags=LAGS if with_vy else (LAGS[0], LAGS[1] + _late_by_tyres(signals)),
             unit=unit,
         )
     if signals.has("ax"):
@@ -219,6 +223,12 @@ def _of_accelerations(signals: Signals, speed: str, car: CarFacts | None) -> Ite
             lags=(-0.1, 0.18),  # wheels under torque run ahead
             unit=unit,
         )
+
+
+def _late_by_tyres(signals: Signals) -> float:
+    """How late ay may be against v r, as the body's sideslip grows with it [s]."""
+    speed = signals.known["speed"][signals.where("speed")]
+    return _REAR_COMPLIANCE * float(np.median(speed)) if speed.size else 0.0
 
 
 def _of_steering(signals: Signals, speed: str, car: CarFacts | None) -> Iterator[Equation]:

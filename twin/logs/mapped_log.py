@@ -1,6 +1,7 @@
 """A log of anybody becomes a `Drive` by its map, and says what was done to it."""
 
 from collections.abc import Mapping, Set
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,10 @@ from twin.logs.formats import format_of
 from twin.logs.map import TORQUES, LogMap, Source, unit_in_si
 from twin.logs.raw_log import Array, Channel, RawLog, check_size, listed
 from twin.logs.resampling import FASTER, gaps, resample
+from twin.logs.spikes import without_spikes
 from twin.logs.units import kind_of, our_unit
 
+STEERING = "steering_wheel_angle"
 _SPEED = "vx or the wheel speeds"
 _MOST_BETWEEN = 100_000  # samples of a drive between two of its log; chosen: one in 100 s
 # What an estimate needs at least; a constant input tells nothing. Chosen after what the laws of
@@ -62,6 +65,9 @@ def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Dri
     done = [*log.notes, *_about_time(grid, log_map)]
     columns = {}
     for name, channel in ours.items():
+        if name == STEERING:
+            channel, spikes = _without_spikes(channel)
+            done += spikes
         columns[name] = resample(channel.time, channel.values, grid, log_map.longest_gap)
         done.append(_about_channel(name, log_map, channel, columns[name]))
     kept = {
@@ -138,6 +144,15 @@ def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
     start = channel.time[0]
     time = start + source.clock * (channel.time - start) - source.delay
     return Channel(time=time, values=values, unit=unit)
+
+
+def _without_spikes(channel: Channel) -> tuple[Channel, list[str]]:
+    """The channel without single samples that stand out, and a sentence about them."""
+    values, count = without_spikes(channel.time, channel.values)
+    if not count:
+        return channel, []
+    sentence = f"{STEERING}: {count} single samples that stand out are left out."
+    return replace(channel, values=values), [sentence]
 
 
 def _grid(log: RawLog, log_map: LogMap, ours: Mapping[str, Channel]) -> Array:
