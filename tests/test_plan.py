@@ -14,11 +14,12 @@ from estimators.joint.expected import (
 )
 from estimators.joint.observer import JointObserver
 from scenarios.__main__ import main
+from scenarios.planning import study
 from scenarios.planning.design import FIRST, cycles, design_of, motion_of
 from scenarios.planning.drive import course_for, driven
 from scenarios.planning.fit import fitted
 from scenarios.planning.limits import PlanLimits, area, speeds, strain
-from scenarios.planning.plan import NOISE, Task, drawn, evaluate
+from scenarios.planning.plan import NOISE, Plan, Task, drawn, evaluate
 from scenarios.planning.wanted import wanted_sd
 from twin import CHANNEL, OUTPUTS, TwinError, Vehicle
 
@@ -174,3 +175,16 @@ def test_an_area_excludes_a_road(capsys):
 def test_a_car_of_which_nothing_is_seen_is_told_so():
     with pytest.raises(TwinError, match=r"allowed: 0\.5 s or more"):
         evaluate(Task("suv", {"Jzz": 100.0}, PlanLimits()), FIRST, 0.3)
+
+
+def test_errors_of_the_study_are_those_of_a_car_with_other_parameters():
+    option, motion = evaluate(Task("suv", {"Jzz": 100.0}, PlanLimits(width=20.0)), FIRST, 6.0)
+    task = Task("suv", {"Jzz": 100.0, "mass": 20.0}, PlanLimits(width=20.0))
+    made = Plan(
+        task=task, design=design_of(FIRST, task.limits), scale=1.0, motion=motion,
+        planned=option, standard={}, cars=(), evaluations=0,
+    )  # fmt: skip
+    errors = np.array([study._errors((made, seed)) for seed in range(2)])
+    assert errors.shape == (2, 2)
+    assert np.abs(errors).max() < 8.0  # standard deviations
+    assert np.abs(errors[0] - errors[1]).min() > 0.0

@@ -91,6 +91,7 @@ REPRODUCTIONS = {
     "kbf-figure-5": Entry(f"{_TRUCK}_figures:figure_5", "the truck's velocities over time"),
     "kbf-figure-6": Entry(f"{_TRUCK}_figures:figure_6", "the truck's mass and inertia over time"),
     "kbf-tuning": Entry(f"{_TRUCK}_tables:tuning", "R and Q by decades: a lower R is not better"),
+    "plan": Entry("scenarios.planning.study:planning", "planned manoeuvres against standard ones"),
     "kbf-robustness": Entry(f"{_TRUCK}_tables:robustness", "filters that believe in another truck"),
 }
 

@@ -43,6 +43,7 @@ FIRST = {
     "while_braking": 0.6,
 }  # fmt: skip
 _FADE = 0.5  # [s] over which the steering begins, and ends before a stop
+_PEDAL = 200  # samples over which a foot goes to the brake
 _PEAK = 0.5 * np.pi  # of the acceleration of a raised cosine, over its mean
 
 
@@ -132,11 +133,12 @@ def motion_of(design: Design, vehicle: Vehicle, limits: PlanLimits, seconds: flo
     fade = np.clip(time / _FADE, 0.0, 1.0)
     if area:
         fade *= np.clip((time[-1] - time) / (2.0 * _FADE), 0.0, 1.0)
-    weight = fade * (1.0 + (design.while_braking - 1.0) * braking)
+    smooth = np.convolve(braking, np.full(_PEDAL, 1.0 / _PEDAL), mode="same")
+    weight = fade * (1.0 + (design.while_braking - 1.0) * smooth)
     return Motion(
         name="plan",
         speed=speed,
-        steering=weight * lateral * hand_wheel_of(vehicle, speed),
+        steering=weight * lateral * hand_wheel_of(vehicle, np.maximum(speed, design.slow)),
         repeats=area,
     )
 
@@ -181,7 +183,7 @@ def _one_pass(design: Design, speed: Array, braking: Array, length: float) -> tu
     rest = np.zeros(round(0.5 / DT))
     return (
         np.concatenate([speed[:end], stop, rest]),
-        np.concatenate([braking[:end], np.ones(stop.size), np.zeros(rest.size)]),
+        np.concatenate([braking[:end], np.ones(stop.size), np.ones(rest.size)]),
     )
 
 

@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 
 _SOFT = 0.9  # [s / sqrt(m)], look-ahead of the lane keeper over the root of the width; chosen
 _WIDE = 60.0  # [m], beyond which it does not get slower
+_KEEPING = 2.0  # [rad/s], of the hand wheel; chosen
 _BENDS = 0.6  # share of the lateral acceleration that a circuit's bends may take
 
 
@@ -116,7 +117,7 @@ def driven(
     """
     driver, car = driver_of(vehicle), Twin(vehicle)
     look_ahead = float(_SOFT * np.sqrt(min(width, _WIDE)))
-    keeper = driver._replace(look_ahead=look_ahead, yaw_gain=0.0)
+    keeper = driver._replace(look_ahead=look_ahead, yaw_gain=0.0, steering_rate=_KEEPING)
     if parameters is not None:
         car.set_parameters(parameters)
     car.reset(float(motion.speed[0]))
