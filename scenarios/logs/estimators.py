@@ -17,6 +17,7 @@ from scenarios.logs.default_observer import default_observer
 from scenarios.logs.follower import driven
 from scenarios.logs.free_parameters import FREE
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
+from scenarios.planning.advice import missing, what_to_drive
 from twin import LOAD, OUTPUTS, SCALES, WHEELS, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
@@ -143,7 +144,8 @@ def joint(vehicle: Vehicle, log: Prepared) -> Found:
     estimate = observer.run(plain)
     parameters = observer.settings.parameters
     sd = dict(zip(estimate.estimated, estimate.sd[-1].tolist(), strict=True))
-    return Found(piece, estimate, parameters, {name: sd[name] for name in parameters}, ())
+    told = what_to_drive(missing(estimate))
+    return Found(piece, estimate, parameters, {name: sd[name] for name in parameters}, told)
 
 
 ESTIMATORS: dict[str, Callable[[Vehicle, Prepared], Found]] = {"til": til, "joint": joint}
