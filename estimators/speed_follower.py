@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from twin import INPUTS, STATES, TwinError
+from twin import INPUTS, TwinError, U, X
+from twin import TORQUES as _TORQUE_BLOCK
 
-TORQUES = tuple(name for name in INPUTS if "torque" in name)
+TORQUES = INPUTS[_TORQUE_BLOCK]
+_FIRST_TORQUE, _AFTER_TORQUES = _TORQUE_BLOCK.start, _TORQUE_BLOCK.stop
 HALF_AIR_DENSITY = 0.6  # [kg/m3]
 
 # Slip of a wheel from which its torque is reduced, and at which nothing is left of it; chosen:
@@ -21,9 +23,8 @@ HALF_AIR_DENSITY = 0.6  # [kg/m3]
 SLIP_LIMITED, LARGEST_SLIP = 0.15, 0.3
 SLOWEST = 3.0  # [m/s], slower than this slip is taken at this speed
 
-_VX = STATES.index("vx")
-_SPIN = STATES.index("wheel_speed_fl")
-_REAR_LEFT, _REAR_RIGHT = STATES.index("wheel_speed_rl"), STATES.index("wheel_speed_rr")
+_VX, _SPIN = X.vx, X.wheel_speed_fl
+_REAR_LEFT, _REAR_RIGHT = X.wheel_speed_rl, X.wheel_speed_rr
 
 
 class SpeedFollower(NamedTuple):
@@ -70,20 +71,20 @@ def follow(follower, speed, acceleration, states, u):
     force = follower.mass * (ahead + follower.gain * (speed - states[_VX]))
     force += HALF_AIR_DENSITY * follower.drag_area * states[_VX] * abs(states[_VX])
     front, rear = 0.5 * follower.radius_front * force, 0.5 * follower.radius_rear * force
-    u[1:9] = 0.0
+    u[_FIRST_TORQUE:_AFTER_TORQUES] = 0.0
     if force > 0.0:
         moved = follower.locking * (states[_REAR_LEFT] - states[_REAR_RIGHT])
-        u[1] = u[2] = front * follower.drive_front
-        u[3] = rear * (1.0 - follower.drive_front) - moved
-        u[4] = rear * (1.0 - follower.drive_front) + moved
+        u[U.drive_torque_fl] = u[U.drive_torque_fr] = front * follower.drive_front
+        u[U.drive_torque_rl] = rear * (1.0 - follower.drive_front) - moved
+        u[U.drive_torque_rr] = rear * (1.0 - follower.drive_front) + moved
     else:
-        u[5] = u[6] = -front * follower.brake_front
-        u[7] = u[8] = -rear * (1.0 - follower.brake_front)
+        u[U.brake_torque_fl] = u[U.brake_torque_fr] = -front * follower.brake_front
+        u[U.brake_torque_rl] = u[U.brake_torque_rr] = -rear * (1.0 - follower.brake_front)
     for w in range(4):
         radius = follower.radius_front if w < 2 else follower.radius_rear
         slip = (radius * states[_SPIN + w] - states[_VX]) / max(abs(states[_VX]), SLOWEST)
         left = (LARGEST_SLIP - abs(slip)) / (LARGEST_SLIP - SLIP_LIMITED)
         left = min(max(left, 0.0), 1.0)
         if slip * force > 0.0:
-            u[1 + w] *= left
-            u[5 + w] *= left
+            u[U.drive_torque_fl + w] *= left
+            u[U.brake_torque_fl + w] *= left

@@ -7,7 +7,7 @@ from estimators.benchmarks import double_track
 from estimators.benchmarks.double_track import Gains, MagicFormula, _axle, friction, slips
 from scenarios.driving.manoeuvres import Manoeuvre
 from scenarios.driving.record import record
-from scenarios.tuning import double_track_fit
+from scenarios.experiment import double_track_fit
 from twin import OUTPUTS, TwinError, Vehicle
 
 NONE = Gains(0.0, 0.0, 0.0, 0.0)

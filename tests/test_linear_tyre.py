@@ -1,9 +1,4 @@
-"""The linear tyre against closed forms, and what it takes to add a third model."""
-
-import shutil
-import subprocess
-import sys
-from pathlib import Path
+"""The linear tyre against closed forms."""
 
 import numpy as np
 import pytest
@@ -16,7 +11,6 @@ from twin.tyre.interface import forces, relaxation, stiffness
 from twin.tyre.magic_formula import magic_formula
 from twin.tyre.radius import effective_radius
 
-ROOT = Path(__file__).parents[1]
 LINEAR = read_tyre_file(models.path("tyres/linear.toml"))
 TEXT = models.path("tyres/linear.toml").read_text()
 
@@ -137,67 +131,3 @@ def test_figures_beside_a_tyre_that_is_no_tir_file_are_refused(tmp_path):
     path.write_text('[tyre.front]\nfile = "tyres/linear.toml"\nfriction = 0.9\n')
     with pytest.raises(TwinError, match=r"tyre\.front\.friction does not apply"):
         Vehicle.load(path)
-
-
-CUBIC = '''"""A tyre whose side force is -C (alpha - alpha^3); no more than a test."""
-
-from twin.toml_fields import Field
-from twin.tyre.shapes import compiled
-
-FIELDS = (Field("cubic_cornering", "1/rad", 10.0, 1.0, 100.0, "cornering stiffness over load"),)
-
-
-@compiled
-def cubic_forces(tyre, fz, kappa, alpha, gamma, vx, side):
-    zero = 0.0 * fz
-    return zero, -tyre.cubic_cornering * fz * (alpha - alpha * alpha * alpha), zero, zero, zero
-
-
-@compiled
-def cubic_stiffness(tyre, fz, gamma):
-    return 0.0 * fz, tyre.cubic_cornering * fz
-
-
-@compiled
-def cubic_relaxation(tyre, fz, gamma):
-    return 0.3 + 0.0 * fz, 0.3 + 0.0 * fz
-'''
-USE = """
-from twin.tyre.files import read_tyre_file
-from twin.tyre.interface import forces, relaxation, stiffness
-tyre = read_tyre_file("cubic.toml")
-print(forces(tyre, 1000.0, 0.0, 0.1, 0.0, 20.0, 1.0)[1], *stiffness(tyre, 1000.0, 0.0),
-      *relaxation(tyre, 1000.0, 0.0))
-"""
-
-
-def test_third_model_is_one_new_module_and_its_lines_in_the_interface(tmp_path):
-    for room in ("twin", "models"):
-        ignore = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / room, tmp_path / room, ignore=ignore)
-    (tmp_path / "twin/tyre/cubic.py").write_text(CUBIC)
-    interface = tmp_path / "twin/tyre/interface.py"
-    text = interface.read_text()
-    text = text.replace("import linear\n", "import cubic, linear\n")
-    text = text.replace('{"linear"', '{"cubic": (2.0, cubic.FIELDS), "linear"')
-    names = "from twin.tyre.cubic import cubic_forces, cubic_relaxation, cubic_stiffness\n"
-    text = text.replace("from twin.tyre.linear import", f"{names}from twin.tyre.linear import")
-    for function, arguments in (
-        ("forces", "tyre, fz, kappa, alpha, gamma, vx, side"),
-        ("stiffness", "tyre, fz, gamma"),
-        ("relaxation", "tyre, fz, gamma"),
-    ):
-        head, name, body = text.partition(f"def {function}(")
-        ours = (
-            f"    if _is(tyre, 2.0):\n        out = cubic_{function}({arguments})\n    return out"
-        )
-        text = head + name + body.replace("    return out", ours, 1)
-    interface.write_text(text)
-    (tmp_path / "cubic.toml").write_text('model = "cubic"\nunloaded_radius = 0.3\n')
-    command = [sys.executable, "-c", USE]
-    environment = {"PYTHONPATH": str(tmp_path)}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    np.testing.assert_allclose(
-        [float(word) for word in done.stdout.split()], [-990, 0, 1e4, 0.3, 0.3]
-    )

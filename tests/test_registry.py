@@ -10,10 +10,10 @@ from estimators.benchmarks.single_track import START, Geometry
 from estimators.benchmarks.static_map import StaticMap
 from estimators.entry import Entry, Given
 from estimators.til.law import ParameterLaw
+from scenarios.experiment import double_track_fit
 from scenarios.experiment.laws import ALL_LAWS as STAGED_LAWS
 from scenarios.experiment.truck import CASES
 from scenarios.experiment.truck_plant import SAMPLE_TIME
-from scenarios.tuning import double_track_fit
 from twin import OUTPUTS, TruckParameters, TwinError, Vehicle
 
 SUV = Vehicle.load("suv")

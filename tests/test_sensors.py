@@ -3,9 +3,9 @@ import pytest
 
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
-from scenarios.plants.mismatch import BRAKE, DRIVE, MISMATCHES, real_drive, real_vehicle
+from scenarios.plants.mismatch import MISMATCHES, real_drive, real_vehicle
 from scenarios.plants.sensors import Sensors, measured
-from twin import OUTPUTS, Drive, TwinError, Vehicle
+from twin import BRAKE_TORQUES, DRIVE_TORQUES, OUTPUTS, Drive, TwinError, Vehicle
 
 INFINITE = float("inf")
 
@@ -90,8 +90,8 @@ def test_drive_of_another_vehicle_is_refused():
 def test_torques_known_are_those_that_act_over_their_share(clean):
     rng = np.random.default_rng(0)
     told = real_drive(clean, MISMATCHES["drive-5"], INFINITE, rng)
-    np.testing.assert_allclose(0.95 * told.inputs[:, DRIVE], clean.inputs[:, DRIVE])
-    assert np.array_equal(told.inputs[:, BRAKE], clean.inputs[:, BRAKE])
+    np.testing.assert_allclose(0.95 * told.inputs[:, DRIVE_TORQUES], clean.inputs[:, DRIVE_TORQUES])
+    assert np.array_equal(told.inputs[:, BRAKE_TORQUES], clean.inputs[:, BRAKE_TORQUES])
 
 
 def test_mismatched_vehicle_has_the_scales_named():

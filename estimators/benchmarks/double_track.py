@@ -30,12 +30,13 @@ from estimators.base import Estimate
 from estimators.entry import Entry
 from estimators.priors import initial_deltas
 from estimators.til.state_and_mass import LARGEST_YAW_RATE
-from twin import OUTPUTS, Drive, TwinError
+from twin import OUTPUTS, WHEEL_SPEEDS, Drive, TwinError, Y
 
 Array = NDArray[np.float64]
 GRAVITY = 9.81
 AIR_DENSITY = 1.2  # [kg/m3]
 SLOWEST = 1.0  # [m/s], below which slips are taken at this speed
+FRONT_WHEELS, REAR_WHEELS, AFTER_WHEELS = Y.wheel_speed_fl, Y.wheel_speed_rl, WHEEL_SPEEDS.stop
 LARGEST_SHARE = 0.7  # of its mass that a car can lose before the model has none
 STATES = ("vx", "vy", "yaw_rate")
 # As of TiL Eq. (32), the range in which to look; the paper gives none that hold its optima
@@ -229,23 +230,23 @@ def _run(car, gains, dt, x, steering, measurements, states, masses, outputs):
     ax, ay = 0.0, 0.0
     for k in range(steering.size):
         y = measurements[k]
-        ax, ay = ax if np.isnan(y[0]) else y[0], ay if np.isnan(y[1]) else y[1]
+        ax, ay = ax if np.isnan(y[Y.ax]) else y[Y.ax], ay if np.isnan(y[Y.ay]) else y[Y.ay]
         mass = max(car.mass + x[3], (1.0 - LARGEST_SHARE) * car.mass)
         angle = steering[k] / car.steering_ratio
-        front = _axle(car, car.front, car.rear, angle, y[6:8], x, mass, ax, ay)
-        rear = _axle(car, car.rear, car.front, 0.0, y[8:10], x, mass, ax, ay)
+        front = _axle(car, car.front, car.rear, angle, y[FRONT_WHEELS:REAR_WHEELS], x, mass, ax, ay)
+        rear = _axle(car, car.rear, car.front, 0.0, y[REAR_WHEELS:AFTER_WHEELS], x, mass, ax, ay)
         drag = 0.5 * AIR_DENSITY * car.drag_area * x[0] * abs(x[0])
         # TiL Eq. (31), corrected: specific forces
         own_ax, own_ay = (front[0] + rear[0] - drag) / mass, (front[1] + rear[1]) / mass
         states[k, 0], states[k, 1], states[k, 2] = x[0], x[1], x[2]
         outputs[k, 0], outputs[k, 1], outputs[k, 2] = own_ax, own_ay, x[2]
-        lacking = _innovation(y[0], own_ax)
+        lacking = _innovation(y[Y.ax], own_ax)
         vx, vy, yaw_rate = x[0], x[1], x[2]
         x[0] += dt * (own_ax + vy * yaw_rate + gains.ax_vx * lacking)
-        x[1] += dt * (own_ay - vx * yaw_rate + gains.ay_vy * _innovation(y[1], own_ay))
+        x[1] += dt * (own_ay - vx * yaw_rate + gains.ay_vy * _innovation(y[Y.ay], own_ay))
         turn = (front[2] + rear[2]) / car.yaw_inertia
-        x[2] += dt * (turn + gains.yaw_rate * _innovation(y[5], yaw_rate))
-        if abs(y[5]) <= LARGEST_YAW_RATE:
+        x[2] += dt * (turn + gains.yaw_rate * _innovation(y[Y.yaw_rate], yaw_rate))
+        if abs(y[Y.yaw_rate]) <= LARGEST_YAW_RATE:
             x[3] -= dt * gains.mass * np.sign(ax) * lacking  # TiL Eq. (24), corrected in sign
         masses[k, 0] = x[3]
         if not (abs(x[0]) < 1e3 and abs(x[1]) < 1e3 and abs(x[2]) < 1e3):

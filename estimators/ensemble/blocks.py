@@ -10,16 +10,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from twin import OUTPUTS, STATES
+from twin import OUTPUTS, SPINS, STATES, WHEEL_ANGLES, WHEEL_SPEEDS, X
 from twin.kernel import correct, read_states, step
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-NX, NY, IMU = len(STATES), len(OUTPUTS), 6
-WHEEL_SPEED = OUTPUTS.index("wheel_speed_fl")
-ROLL, PITCH, VX, SPIN = (STATES.index(n) for n in ("roll", "pitch", "vx", "wheel_speed_fl"))
-ANGLE = STATES.index("wheel_angle_fl")
+NX, NY = len(STATES), len(OUTPUTS)
+FIRST_WHEEL, AFTER_WHEELS = WHEEL_SPEEDS.start, WHEEL_SPEEDS.stop
+ROLL, VX = X.roll, X.vx
+ANGLES, AFTER_ANGLES = WHEEL_ANGLES.start, WHEEL_ANGLES.stop
+FIRST_SPIN, AFTER_SPINS = SPINS.start, SPINS.stop
 ABSENT = 1e12  # variance of a channel that has no measurement
 LEAST_SPIN = 1.0  # slower than this a wheel speed tells no speed of the car [rad/s]; chosen
 
@@ -101,10 +102,10 @@ def move_states(car, dx, roll):
     These have no influence. The change of the pitch angle becomes a small turn about the axes of a
     body that leans by an angle of roll [rad].
     """
-    dx[0:2] = 0.0
-    pitch = dx[PITCH]
-    dx[PITCH], dx[PITCH + 1] = np.cos(roll) * pitch, -np.sin(roll) * pitch
-    dx[ANGLE : ANGLE + 4] = 0.0
+    dx[X.x] = dx[X.y] = 0.0
+    pitch = dx[X.pitch]
+    dx[X.pitch], dx[X.yaw] = np.cos(roll) * pitch, -np.sin(roll) * pitch
+    dx[ANGLES:AFTER_ANGLES] = 0.0
     correct(car, dx)
 
 
@@ -118,7 +119,7 @@ def follow_speed(cars, block, share):
     x, dx = np.empty(NX), np.zeros(NX)
     for i in range(cars.size):
         late, spin, n = 0.0, 0.0, 0
-        for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
+        for j in range(FIRST_WHEEL, AFTER_WHEELS):
             if block.number[j] > 0.0:
                 late += block.measured[j] - block.mean[i, j]
                 spin += block.mean[i, j]
@@ -127,6 +128,6 @@ def follow_speed(cars, block, share):
             continue
         read_states(cars[i], x)
         dx[VX] = share * late / spin * x[VX]
-        for k in range(SPIN, SPIN + 4):
+        for k in range(FIRST_SPIN, AFTER_SPINS):
             dx[k] = share * late / spin * x[k]
         correct(cars[i], dx)

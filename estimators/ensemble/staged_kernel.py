@@ -14,24 +14,25 @@ from numpy.typing import NDArray
 
 from estimators.ensemble.blocks import (
     ABSENT,
-    IMU,
+    AFTER_WHEELS,
+    FIRST_WHEEL,
     NX,
     NY,
     ROLL,
-    WHEEL_SPEED,
     advance,
     follow_speed,
     kalman_step,
     move_states,
 )
 from estimators.til.law import advance_law
-from twin import PARAMETER, PARAMETERS, P, Y
+from twin import IMU, PARAMETER, PARAMETERS, P, Y
 from twin.kernel import is_sound, read_states, set_parameters
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 MASS, PITCH, CM, ROLL_YAW = range(4)
+BIASES = IMU.stop  # of the first channels
 AX, AY, YAW_RATE = Y.ax, Y.ay, Y.yaw_rate
 CM_X = P.cm_x  # cm_y and cm_z come after
 # The stage of each parameter that a law corrects; those of the CM have no law
@@ -74,7 +75,7 @@ class Memory(NamedTuple):
 @njit(cache=True, nogil=True)
 def _condition(setup, memory, y):
     """Whether the drive is, now, what the stage wants."""
-    for k in range(WHEEL_SPEED, WHEEL_SPEED + 4):
+    for k in range(FIRST_WHEEL, AFTER_WHEELS):
         if y[k] < setup.least_wheel_speed:  # NaN is not
             return False
     straight = abs(memory.yaw_rate[0]) < setup.straight
@@ -153,14 +154,14 @@ def _find_cm(cars, setup, memory, block):
     old CM for a while, and the fit would correct it twice.
     """
     slow, n = memory.slow[1], cars.size
-    h, r, variance = np.zeros((NY, 3 + IMU)), np.zeros(NY), np.full(NY, ABSENT)
+    h, r, variance = np.zeros((NY, 3 + BIASES)), np.zeros(NY), np.full(NY, ABSENT)
     for j in range(NY):
         for i in range(3):
             h[j, i] = (slow[i + 1, j] - slow[0, j]) / OFFSET
-        if j < IMU:
+        if j < BIASES:
             h[j, 3 + j] = 1.0
         if block.number[j] > 0.0 and not np.isnan(setup.noise[j]):
-            r[j] = slow[n, j] - slow[0, j] - (memory.z[3 + j] if j < IMU else 0.0)
+            r[j] = slow[n, j] - slow[0, j] - (memory.z[3 + j] if j < BIASES else 0.0)
             variance[j] = setup.noise[j] / block.number[j]
     before = memory.z[:3].copy()
     kalman_step(memory.z, memory.covariance, h, r, variance, setup.step_limit)

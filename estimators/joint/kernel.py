@@ -18,10 +18,12 @@ from estimators.joint.noise_inflation import forget_load, inflate_noise, keep, l
 from estimators.joint.parameter_tracking import track_parameters, track_speed
 from estimators.joint.state import (
     ABSENT,
+    AFTER_WHEELS,
     BLOCKS,
     DELAY,
     DRIVEN,
     EXCITING,
+    FIRST_WHEEL,
     IMU,
     LEAST_SPIN,
     NY,
@@ -34,7 +36,6 @@ from estimators.joint.state import (
     VX,
     WAIT,
     WATCH,
-    WHEEL_SPEED,
 )
 from twin.kernel import is_sound, read_states, step
 
@@ -118,7 +119,7 @@ def _sensitivity(config, state):
         elif error == DELAY:
             h[:, i] = -change
         elif error == SPEED:
-            for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
+            for j in range(FIRST_WHEEL, AFTER_WHEELS):
                 h[j, i] = state.total[0, j] / config.block / max(state.states[0, VX], 1.0)
         else:
             arm = np.zeros(3)
@@ -173,7 +174,10 @@ def _is_excited(config, state):
         square[k] += share * (value**2 - square[k])
         weight = 1.0 if EXCITING[k] < ROLL_RATE else config.rate_weight
         total += weight * (square[k] - mean[k] ** 2)
-    spin = min(state.total[0, WHEEL_SPEED:].min() / config.block, state.late[:, -1].min())
+    spin = min(
+        state.total[0, FIRST_WHEEL:AFTER_WHEELS].min() / config.block,
+        state.late[:, AFTER_WHEELS - 1].min(),
+    )
     return total >= config.least_excitation and spin >= LEAST_SPIN
 
 

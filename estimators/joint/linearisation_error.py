@@ -13,7 +13,7 @@ Two things are less smooth than that: a wheel about to lock, and a suspension th
 import numpy as np
 from numba import njit
 
-from estimators.joint.state import ABSENT, DRIVEN, LEAST_SPIN, NY, WAIT, WHEEL_SPEED
+from estimators.joint.state import ABSENT, AFTER_WHEELS, DRIVEN, FIRST_WHEEL, LEAST_SPIN, NY, WAIT
 
 
 @njit(cache=True, nogil=True)
@@ -33,7 +33,7 @@ def add_linearisation_error(config, state, h, variance):
             second += state.usual[j, i] * uncertain[i]
         if variance[j] < ABSENT:
             variance[j] += config.curvature * far * second
-            if j >= WHEEL_SPEED:
+            if FIRST_WHEEL <= j < AFTER_WHEELS:
                 variance[j] += _slip_variance(config, state, h, j)
 
 
@@ -41,8 +41,8 @@ def add_linearisation_error(config, state, h, variance):
 def _own(h, j):
     """(q,) sensitivity of a wheel's own speed: what the wheels have in common is the car's."""
     own = h[j].copy()
-    for k in range(WHEEL_SPEED, NY):
-        own -= h[k] / (NY - WHEEL_SPEED)
+    for k in range(FIRST_WHEEL, AFTER_WHEELS):
+        own -= h[k] / (AFTER_WHEELS - FIRST_WHEEL)
     return own
 
 

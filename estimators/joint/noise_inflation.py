@@ -5,12 +5,13 @@ from numba import njit
 
 from estimators.joint.state import (
     ABSENT,
+    AFTER_WHEELS,
     DRIVEN,
+    FIRST_WHEEL,
     LARGEST_INFLATION,
     NY,
     STANDING,
     WATCH,
-    WHEEL_SPEED,
     WINDOW,
 )
 
@@ -47,7 +48,7 @@ def inflate_noise(config, state, h, r, variance):
 @njit(cache=True, nogil=True)
 def keep(config, state):
     """Keeps the estimates while the car stands: its load may change now."""
-    for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
+    for j in range(FIRST_WHEEL, AFTER_WHEELS):
         if abs(state.late[0, j]) > STANDING or abs(state.measured[j]) > STANDING * config.block:
             return
     if state.blocks[DRIVEN] < config.settle:

@@ -12,7 +12,17 @@ import numpy as np
 from numba import njit
 
 from estimators.ensemble.blocks import move_states
-from estimators.joint.state import LEAST_SPIN, NX, ROLL, SPEED, SPIN, VX, WHEEL_SPEED
+from estimators.joint.state import (
+    AFTER_SPINS,
+    AFTER_WHEELS,
+    FIRST_SPIN,
+    FIRST_WHEEL,
+    LEAST_SPIN,
+    NX,
+    ROLL,
+    SPEED,
+    VX,
+)
 from twin.kernel import correct, read_states, set_parameters
 
 
@@ -72,7 +82,7 @@ def track_speed(cars, config, state):
         return
     for i in range(cars.size):
         late, spin, n = 0.0, 0.0, 0
-        for j in range(WHEEL_SPEED, WHEEL_SPEED + 4):
+        for j in range(FIRST_WHEEL, AFTER_WHEELS):
             if state.present[j] > 0.0:
                 mean = state.total[i, j] / config.block
                 late += state.measured[j] / state.present[j] - mean
@@ -83,6 +93,6 @@ def track_speed(cars, config, state):
         read_states(cars[i], state.states[i])
         state.dx[:] = 0.0
         state.dx[VX] = share * late / spin * state.states[i, VX]
-        for k in range(SPIN, SPIN + 4):
+        for k in range(FIRST_SPIN, AFTER_SPINS):
             state.dx[k] = share * late / spin * state.states[i, k]
         correct(cars[i], state.dx)

@@ -13,8 +13,10 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 NY, NX = len(OUTPUTS), len(STATES)
-IMU, WHEEL_SPEED = IMU_OUTPUTS.stop, WHEEL_SPEEDS.start
-ROLL, VX, SPIN = X.roll, X.vx, SPINS.start
+IMU = IMU_OUTPUTS.stop
+FIRST_WHEEL, AFTER_WHEELS = WHEEL_SPEEDS.start, WHEEL_SPEEDS.stop
+FIRST_SPIN, AFTER_SPINS = SPINS.start, SPINS.stop
+ROLL, VX = X.roll, X.vx
 ROLL_RATE = Y.roll_rate
 EXCITING = np.array([Y.ax, Y.ay, Y.roll_rate, Y.pitch_rate])
 ABSENT = 1e12  # variance of a channel that has no measurement

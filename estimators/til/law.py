@@ -48,7 +48,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from twin import OUTPUTS, PARAMETERS, TwinError
+from twin import OUTPUTS, PARAMETERS, WHEEL_SPEEDS, TwinError, Y
 
 Array = NDArray[np.float64]
 Form = Literal["sign", "least-squares", "integral"]
@@ -63,8 +63,8 @@ ACCELERATIONS = {
     "yaw_acceleration": "yaw_rate",
 }
 SIGNALS = (*OUTPUTS, *ACCELERATIONS)
-_YAW_RATE = OUTPUTS.index("yaw_rate")
-_WHEEL_SPEEDS = OUTPUTS[6:]
+_YAW_RATE = Y.yaw_rate
+_FIRST_WHEEL, _AFTER_WHEELS = WHEEL_SPEEDS.start, WHEEL_SPEEDS.stop
 
 # Columns of a law's memory: covariance of parameter and offset, and the offset itself
 PP, PO, OO, OFFSET = range(4)
@@ -254,12 +254,12 @@ def _check_names(law: ParameterLaw, outputs: tuple[str, ...], parameters: tuple[
         if name not in allowed:
             raise TwinError(f"law: {kind} is {name!r}; this black box allows: {', '.join(allowed)}")
     for name in ("least_wheel_speed", "compensation"):
-        if getattr(law, name) > 0.0 and outputs[6:] != _WHEEL_SPEEDS:
+        if getattr(law, name) > 0.0 and outputs[WHEEL_SPEEDS] != OUTPUTS[WHEEL_SPEEDS]:
             raise TwinError(
                 f"law: {name} is {getattr(law, name)}; this black box, without wheel speeds, "
                 "allows: 0"
             )
-    if law.largest_yaw_rate < math.inf and outputs[5:6] != ("yaw_rate",):
+    if law.largest_yaw_rate < math.inf and outputs[_YAW_RATE : _YAW_RATE + 1] != ("yaw_rate",):
         raise TwinError(
             f"law: largest_yaw_rate is {law.largest_yaw_rate}; this black box, without a yaw rate, "
             "allows: inf"
@@ -269,7 +269,10 @@ def _check_names(law: ParameterLaw, outputs: tuple[str, ...], parameters: tuple[
 @njit(cache=True)
 def _moving(y, least):
     """Whether the mean of the wheel speeds is at least so much [rad/s]."""
-    return y[6] + y[7] + y[8] + y[9] >= 4.0 * least
+    total = 0.0
+    for i in range(_FIRST_WHEEL, _AFTER_WHEELS):
+        total += y[i]
+    return total >= 4.0 * least
 
 
 @njit(cache=True)
@@ -279,7 +282,7 @@ def _lead(y, twin_y):
     A wheel speed that is not measured has not been corrected either.
     """
     lead, count = 0.0, 0
-    for i in range(6, 10):
+    for i in range(_FIRST_WHEEL, _AFTER_WHEELS):
         if not np.isnan(y[i]):
             lead += y[i] - twin_y[i]
             count += 1

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from twin import EXTENDED, INPUTS, OUTPUTS, PARAMETERS, STATES, Twin, TwinError
+from twin import EXTENDED, INPUTS, OUTPUTS, PARAMETERS, STATES, Twin, TwinError, U
 from twin.kernel import correct, is_sound, read_states, step
 
 Array = NDArray[np.float64]
@@ -136,7 +136,7 @@ def _steering(car, speed, time):
 @njit(cache=True, nogil=True)
 def _advance(car, speed, time, u, y, x, dx):
     """One step at a speed that is held from outside."""
-    u[0] = _steering(car, speed, time)
+    u[U.steering_wheel_angle] = _steering(car, speed, time)
     step(car, u, y)
     read_states(car, x)
     dx[_VX] = speed - x[_VX]

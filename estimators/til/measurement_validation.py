@@ -19,19 +19,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from twin import ACCELERATIONS, CHANNEL, OUTPUTS, RATES, WHEEL_SPEEDS
+
 Array = NDArray[np.float64]
 
-# By kind of channel: the largest that is plausible, by how much the twin's output moves clearly,
-# and the least half width of the gate. Chosen: 6 g, twice what a racing car does; several digits
-# of a coarse sensor; more than a twin of another load is off by. Units: m/s2, rad/s.
-_ACCELERATION = (60.0, 0.4, 4.0)
-_RATE = (10.0, 0.04, 0.4)
-_WHEEL_SPEED = (500.0, 1.0, 6.0)
-_KINDS = {"a": _ACCELERATION, "r": _RATE, "p": _RATE, "y": _RATE, "w": _WHEEL_SPEED}
-_GUARDED = (
-    *("ax", "ay", "az", "roll_rate", "pitch_rate", "yaw_rate"),
-    *(f"wheel_speed_{wheel}" for wheel in ("fl", "fr", "rl", "rr")),
-)
+# By channel: by how much the twin's output moves clearly, and the least half width of the gate.
+# Chosen: several digits of a coarse sensor; more than a twin of another load is off by. The largest
+# plausible value is that of the channel's record. Units: m/s2, rad/s.
+_WHEELS = OUTPUTS[WHEEL_SPEEDS]
+_LIMITS = {
+    **dict.fromkeys(OUTPUTS[ACCELERATIONS], (0.4, 4.0)),
+    **dict.fromkeys(OUTPUTS[RATES], (0.04, 0.4)),
+    **dict.fromkeys(_WHEELS, (1.0, 6.0)),
+}
 
 SETTLING = 1.0  # [s] without a fault before estimates count as trustworthy again; chosen
 GRACE = 0.25  # [s] that a value may stay the same before it is watched; chosen
@@ -59,10 +59,10 @@ def new_watch(outputs: tuple[str, ...], used: set[str]) -> Array:
     """
     watch = np.zeros((len(outputs), COLUMNS))
     for row, name in zip(watch, outputs, strict=True):
-        limits = _KINDS[name[0]] if name in _GUARDED else (np.inf, np.inf, np.inf)
-        row[LARGEST], row[MOVED], row[FLOOR] = limits
+        row[LARGEST] = CHANNEL[name].high if name in _LIMITS else np.inf
+        row[MOVED], row[FLOOR] = _LIMITS.get(name, (np.inf, np.inf))
         row[USED] = name in used
-        row[IS_WHEEL] = name in _GUARDED[6:]
+        row[IS_WHEEL] = name in _WHEELS
     renew(watch)
     return watch
 

@@ -41,7 +41,7 @@ from estimators.til.measurement_validation import (
     new_watch,
     renew,
 )
-from twin import PARAMETERS, Drive, Twin, TwinError, check_inputs
+from twin import PARAMETERS, Drive, Twin, TwinError, Y, check_inputs
 from twin.kernel import correct, is_sound, read_states, set_parameters, step
 
 Array = NDArray[np.float64]
@@ -369,7 +369,7 @@ def _run(
         read_states(car, states[k])
         _copy(given.inputs[k], memory.u)
         if given.speed.size:
-            ahead = _plausible(memory, given.measurements[k, 0])
+            ahead = _plausible(memory, given.measurements[k, Y.ax])
             follow(follower, given.speed[k], ahead, states[k], memory.u)
         _update(car, gains, laws, memory, given.measurements[k], every)
         _copy(memory.p, parameters[k])

@@ -44,6 +44,11 @@ def list_() -> None:
 @jobs_option
 @duration_option
 @click.option(
+    "--car",
+    metavar="CAR",
+    help="Drive this car, a name or a file, in a scenario that any car can drive.",
+)
+@click.option(
     "--estimator",
     "estimators",
     multiple=True,
@@ -72,6 +77,7 @@ def run(
     seeds: int,
     jobs: int,
     duration: float | None,
+    car: str | None,
     estimators: tuple[str, ...],
     rrd: Path | None,
     gains: Path | None,
@@ -85,6 +91,7 @@ def run(
     The timeline shows the first seed.
     """
     experiment = catalogue.scenario(name)
+    experiment = experiment if car is None else experiment.of(car)
     settings: dict[str, Any] = {"snr": snr, "duration": duration, "estimators": estimators}
     if gains:
         settings["gains"] = catalogue.find("gains")(gains, experiment, estimators)

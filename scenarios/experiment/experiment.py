@@ -240,6 +240,8 @@ class Experiment:
         picture: draws trials of one drive, for `til run --png`.
         calibrate: what `til tune` does instead of a search for gains.
         study: what is run instead of cases and estimators.
+        with_car: the same with another car, by its name in `models` or its file; None: there is
+            none, its vehicle belongs to the experiment.
     """
 
     name: str
@@ -257,6 +259,20 @@ class Experiment:
     picture: "Callable[[Sequence[Trial], Path], None] | None" = None
     calibrate: Callable[..., Any] | None = None
     study: Study | None = None
+    with_car: "Callable[[str], Experiment] | None" = None
+
+    def of(self, car: str) -> "Experiment":
+        """The same experiment with another car.
+
+        Args:
+            car: its name in `models`, or its file.
+
+        Raises:
+            TwinError: the experiment keeps its own car.
+        """
+        if self.with_car is None:
+            raise TwinError(f"{self.name}: car is {car!r}; allowed: none, the scenario has its own")
+        return self.with_car(car)
 
     def at(self, snr: float | None) -> tuple[Case, ...]:
         """The cases of `til run` at a signal-to-noise ratio [dB]; None: at their own.

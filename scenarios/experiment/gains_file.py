@@ -48,6 +48,11 @@ def write(
         partial.write_bytes(tomli_w.dumps(content).encode())
 
 
+def ships(vehicle: str, estimator: str) -> bool:
+    """Whether the project has tuned gains of an estimator for a car."""
+    return (FOLDER / f"{vehicle}-{estimator}.toml").is_file()
+
+
 def shipped(vehicle: str, estimator: str, names: Iterable[str]) -> dict[str, float]:
     """The gains of the project, see `read`."""
     path = FOLDER / f"{vehicle}-{estimator}.toml"

@@ -3,24 +3,26 @@
 The paper's car and its data cannot be had. A second simulation plays the real vehicle, one that
 differs from the twin as its name says, or another program's car. The real vehicle is unloaded; the
 estimators believe at the start that 350 kg are missing, as the paper's do.
+
+Any car can take the place of the sports car: its driver and its limits follow from its file. Where
+the project ships no gains for it, it gets those that a tuning starts from; where it ships no double
+track, one is fitted.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-import models
 from estimators.benchmarks import double_track, static_map
 from estimators.entry import Given
 from estimators.til import state_and_mass
 from scenarios.driving.drivers import limits_of
 from scenarios.driving.manoeuvres import lane_changes, laps
 from scenarios.driving.record import CourseManoeuvre
-from scenarios.experiment import gains_file
+from scenarios.experiment import double_track_fit, gains_file
 from scenarios.experiment.experiment import Case, Cost, Experiment, Gain, Recipe, Run, Score
 from scenarios.experiment.metrics import sideslip_and_mass
 from scenarios.experiment.plants import CommonRoadCar, SimulatedCar
@@ -74,7 +76,9 @@ _UNTUNED = {
 
 @cache
 def gains_of(car: str, estimator: str) -> Mapping[str, float]:
-    """The gains that ship with the project."""
+    """The gains that ship with the project, or those that a tuning starts from."""
+    if not gains_file.ships(car, estimator):
+        return _UNTUNED[estimator]
     return gains_file.shipped(car, estimator, BOUNDS[estimator])
 
 
@@ -83,8 +87,7 @@ def _gains(run: Run, estimator: str) -> Mapping[str, float]:
 
 
 def _tunable(estimator: str, car: str) -> tuple[Gain, ...]:
-    has_file = (gains_file.FOLDER / f"{car}-{estimator}.toml").is_file()
-    today = gains_of(car, estimator) if has_file else _UNTUNED[estimator]
+    today = gains_of(car, estimator)
     return tuple(Gain(n, low, high, today[n]) for n, (low, high) in BOUNDS[estimator].items())
 
 
@@ -140,8 +143,9 @@ AXLE_FORCES = {"til-axle-forces": Recipe(estimator="til", complete=_til_axle_for
 
 @cache
 def double_track_of(car: str) -> double_track.DoubleTrack:
-    """The double track of a car, as `scenarios.tuning.double_track_fit` fits it."""
-    return double_track.load(Path(models.__file__).parent / "double_track" / f"{car}.toml")
+    """The double track that ships with the project; for another car, one that is fitted to it."""
+    path = double_track_fit.path(car)
+    return double_track.load(path) if path.is_file() else double_track_fit.fit(car)
 
 
 @cache
@@ -156,32 +160,44 @@ def wheels_of(car: str) -> state_and_mass.Wheels:
 @cache
 def _fitted_map(car: str) -> static_map.StaticMap:
     """Fitted to laps of a real vehicle with its true sideslip: more than a user has."""
-    drive = case(COMMONROAD if car == BMW else CASE, "laps").noisy_drive(FIT_SEED)
+    real = case(COMMONROAD, "laps") if car == BMW else case(CASE, "laps", car)
+    drive = real.noisy_drive(FIT_SEED)
     return static_map.fit(*static_map.map_inputs(drive), drive.truth["sideslip"])
 
 
-def sports_car_laps(duration: float | None = None) -> CourseManoeuvre:
-    """Laps at the limits of the sports car."""
-    return laps(duration=duration, limits=limits_of(Vehicle.load(TWIN)))
+DriveName = Literal["laps", "lane-change"]
 
 
-def sports_car_lane_changes(duration: float | None = None) -> CourseManoeuvre:
-    """Lane changes at the limits of the sports car."""
-    return lane_changes(duration=duration, limits=limits_of(Vehicle.load(TWIN)))
+@dataclass(frozen=True, slots=True)
+class AtLimits:
+    """A drive at the limits of a car; a function of its duration.
+
+    Attributes:
+        car: whose limits, by its name in `models` or its file.
+        drive: which.
+    """
+
+    car: str
+    drive: DriveName
+
+    def __call__(self, duration: float | None = None) -> CourseManoeuvre:
+        """The manoeuvre; of the first so many seconds only, if a duration is given [s]."""
+        manoeuvre = laps if self.drive == "laps" else lane_changes
+        return manoeuvre(duration=duration, limits=limits_of(Vehicle.load(self.car)))
 
 
-def case(vehicle: str, drive: Literal["laps", "lane-change"]) -> Case:
+def case(vehicle: str, drive: DriveName, car: str = TWIN) -> Case:
     """A real vehicle on a drive.
 
     Args:
         vehicle: a name of `MISMATCHES`, or `COMMONROAD`.
         drive: which.
+        car: of the twin and, but for CommonRoad's, of the real vehicle.
     """
     if vehicle == COMMONROAD:
         plant, twin = CommonRoadCar(drives=drive), BMW
     else:
-        manoeuvre = sports_car_laps if drive == "laps" else sports_car_lane_changes
-        plant, twin = SimulatedCar(car=TWIN, manoeuvre=manoeuvre, mismatch=vehicle), TWIN
+        plant, twin = SimulatedCar(car=car, manoeuvre=AtLimits(car, drive), mismatch=vehicle), car
     return Case(
         name=f"{vehicle}, {drive}",
         plant=plant,
@@ -202,7 +218,7 @@ def case(vehicle: str, drive: Literal["laps", "lane-change"]) -> Case:
 SEED = 1000
 LAP = 105.0  # [s]
 STARTS = {"robust": (MISSING, 200.0), "paper": (MISSING,)}  # [kg]
-DURATIONS: Mapping[str, Mapping[Literal["laps", "lane-change"], float]] = {
+DURATIONS: Mapping[str, Mapping[DriveName, float]] = {
     "robust": {"laps": LAP, "lane-change": 80.0},
     "paper": {"laps": LAP},
 }  # [s]
@@ -217,7 +233,7 @@ def _runs(
     return [
         Run(
             experiment=experiment,
-            case=replace(case(CASE, drive), initial=(("mass", start),)),
+            case=replace(case(CASE, drive, experiment.cases[0].twin), initial=(("mass", start),)),
             estimator=estimator,
             seed=SEED,
             duration=duration,
@@ -264,14 +280,20 @@ def _cost(
 COSTS = {"robust": _cost("robust", _robust, 1e3), "paper": _cost("paper", _paper, 1e4)}
 
 
-def experiment(drive: Literal["laps", "lane-change"]) -> Experiment:
-    """A drive of the mismatched car."""
+def experiment(drive: DriveName, car: str = TWIN) -> Experiment:
+    """A drive of the mismatched car.
+
+    Args:
+        drive: which.
+        car: by its name in `models` or its file.
+    """
     return Experiment(
         name=drive,
-        cases=(case(CASE, drive),),
+        cases=(case(CASE, drive, car),),
         estimators=RECIPES,
         quantities=("sideslip", "mass", "fy_front", "fy_rear"),
         metrics=sideslip_and_mass,
         costs=COSTS,
         timeline="sideslip and mass",
+        with_car=partial(experiment, drive),
     )

@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenarios.plants.sensors import Sensors, measured
-from twin import Drive, Vehicle
-
-DRIVE, BRAKE = slice(1, 5), slice(5, 9)  # columns of `twin.INPUTS`
+from twin import BRAKE_TORQUES, DRIVE_TORQUES, Drive, Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,8 +112,8 @@ def real_drive(clean: Drive, mismatch: Mismatch, snr: float, rng: np.random.Gene
         rng: of the noise.
     """
     inputs = clean.inputs.copy()
-    inputs[:, DRIVE] /= mismatch.drive
-    inputs[:, BRAKE] /= mismatch.brake
+    inputs[:, DRIVE_TORQUES] /= mismatch.drive
+    inputs[:, BRAKE_TORQUES] /= mismatch.brake
     shares = {"drive_torque": mismatch.drive, "brake_torque": mismatch.brake}
     truth = dict(clean.truth)
     truth |= {name: truth[name] * share for name, share in shares.items() if name in truth}

@@ -18,7 +18,9 @@ from scenarios.plants.surroundings import BEFORE, SPACING, surroundings
 from twin import (
     INPUTS,
     OUTPUTS,
+    ROAD_HEIGHTS,
     SCALES,
+    SPINS,
     STATES,
     TYRE_OUTPUTS,
     WHEELS,
@@ -26,13 +28,14 @@ from twin import (
     Twin,
     TwinError,
     Vehicle,
+    X,
 )
 from twin.kernel import is_sound, read_states, step
 
 Array = NDArray[np.float64]
 
-VX, YAW, YAW_RATE = (STATES.index(name) for name in ("vx", "yaw", "yaw_rate"))
-SPIN = STATES.index("wheel_speed_fl")
+FIRST_SPIN, AFTER_SPINS = SPINS.start, SPINS.stop
+FIRST_ROAD, AFTER_ROADS = ROAD_HEIGHTS.start, ROAD_HEIGHTS.stop
 
 
 def record_real(
@@ -78,7 +81,7 @@ def record_real(
         done = _follow(*arguments, manoeuvre.course, new_memory(), *records)
     if done < n:
         raise TwinError(f"{manoeuvre.name}: {vehicle.source} blew up at {done * twin.dt:.3f} s")
-    inputs[:, 9:13] = manoeuvre.road
+    inputs[:, ROAD_HEIGHTS] = manoeuvre.road
     return Drive(
         time=np.arange(n) * twin.dt,
         inputs=inputs,
@@ -119,14 +122,14 @@ def _act(car, parts, driver, around, road, speed, steering, inputs, outputs, sta
         read_states(car, x)
         told[0] = steering[k]
         integral, force = pedals(
-            driver, speed[k], 0.0, x[VX], integral, force, driver.largest_force, car.dt
+            driver, speed[k], 0.0, x[X.vx], integral, force, driver.largest_force, car.dt
         )
-        if speed[k] == 0.0 and x[VX] < CREEP:
+        if speed[k] == 0.0 and x[X.vx] < CREEP:
             told[1:5], told[5:9] = 0.0, driver.holding_torque
         else:
             torques(driver, force, told)
         _advance(car, parts, around, k, distance, road[k], x, told, now, heat, outputs[k])
-        distance += x[VX] * car.dt
+        distance += x[X.vx] * car.dt
         tyres[k] = car.tyre_output
         if not is_sound(car):
             return k
@@ -141,11 +144,11 @@ def _follow(car, parts, driver, around, road, course, memory, inputs, outputs, s
         x, told = states[k], inputs[k]
         read_states(car, x)
         drive_along(
-            driver, course, memory, x[0], x[1], x[YAW], x[VX], x[VX + 1], x[YAW_RATE],
-            x[SPIN : SPIN + 4], car.dt, told,
+            driver, course, memory, x[X.x], x[X.y], x[X.yaw], x[X.vx], x[X.vy], x[X.yaw_rate],
+            x[FIRST_SPIN:AFTER_SPINS], car.dt, told,
         )  # fmt: skip
         _advance(car, parts, around, k, distance, road[k], x, told, now, heat, outputs[k])
-        distance += x[VX] * car.dt
+        distance += x[X.vx] * car.dt
         tyres[k] = car.tyre_output
         if not is_sound(car):
             return k
@@ -156,7 +159,7 @@ def _follow(car, parts, driver, around, road, course, memory, inputs, outputs, s
 def _advance(car, parts, around, k, distance, road, x, told, now, heat, y):
     """One step of the car with what acts on it; fills the outputs."""
     act_on(parts, car.dt, k, x, told, now, heat)
-    _road(around.heights, distance, parts.wheelbase, road, now[9:13])
+    _road(around.heights, distance, parts.wheelbase, road, now[FIRST_ROAD:AFTER_ROADS])
     suspend(car, parts, x)
     turn_wheels(car, parts, x)
     blow(parts, around.wind[k], x)

@@ -7,12 +7,22 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from scenarios.plants.random_car import RealCar
-from scenarios.plants.sensors import ACCELERATIONS, RATES, lever
-from twin import WHEELS, Drive, TwinError, noise_sd
+from scenarios.plants.sensors import lever
+from twin import (
+    ACCELERATIONS,
+    IMU,
+    RATES,
+    ROAD_HEIGHTS,
+    TORQUES,
+    WHEEL_SPEEDS,
+    WHEELS,
+    Drive,
+    TwinError,
+    U,
+    noise_sd,
+)
 
 Array = NDArray[np.float64]
-STEERING, TORQUES, ROAD = slice(0, 1), slice(1, 9), slice(9, 13)  # columns of `twin.INPUTS`
-IMU, SPINS = slice(0, 6), slice(6, 10)  # columns of `twin.OUTPUTS`
 WHAT_MAY_BE_KNOWN = ("road",)
 
 
@@ -39,22 +49,23 @@ def told(
         raise TwinError(f"knows is {sorted(knows)}; allowed: {', '.join(WHAT_MAY_BE_KNOWN)}")
     inputs, dt = clean.inputs.copy(), clean.dt
     imu, spins, hand_wheel, torques = real["bus_delays"]
-    inputs[:, STEERING] = _late(inputs[:, STEERING], hand_wheel / dt)
+    steering = [U.steering_wheel_angle]
+    inputs[:, steering] = _late(inputs[:, steering], hand_wheel / dt)
     noise = 1000.0 * real.number("torque_noise") * rng.standard_normal(inputs[:, TORQUES].shape)
     acting = inputs[:, TORQUES] > 0.0
     inputs[:, TORQUES] = np.maximum(inputs[:, TORQUES] + acting * noise, 0.0)
     inputs[:, TORQUES] = _late(inputs[:, TORQUES], torques / dt)
     if "road" not in knows:
-        inputs[:, ROAD] = 0.0
+        inputs[:, ROAD_HEIGHTS] = 0.0
     y = clean.measurements.copy()
     y[:, IMU] = _imu(y[:, IMU], real, dt)
     for w, wheel in enumerate(WHEELS):
         phase = clean.truth[f"wheel_angle_{wheel}"] + w
-        y[:, SPINS.start + w] *= 1.0 + real.number("wheel_speed_ripple") * np.sin(phase)
+        y[:, WHEEL_SPEEDS.start + w] *= 1.0 + real.number("wheel_speed_ripple") * np.sin(phase)
     # measurements of the time that the other clock shows
     ahead = real.number("clock") * np.arange(len(clean))
     y[:, IMU] = _late(y[:, IMU], imu / dt - ahead)
-    y[:, SPINS] = _late(y[:, SPINS], spins / dt - ahead)
+    y[:, WHEEL_SPEEDS] = _late(y[:, WHEEL_SPEEDS], spins / dt - ahead)
     y += noise_sd(clean.measurements, snr) * rng.standard_normal(y.shape)
     return clean.replace(
         inputs=inputs,

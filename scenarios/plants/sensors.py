@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import lfilter
 
-from twin import OUTPUTS, Drive, TwinError, noise_sd
+from twin import ACCELERATIONS, OUTPUTS, RATES, WHEEL_SPEEDS, Drive, TwinError, noise_sd
 
 Array = NDArray[np.float64]
-ACCELERATIONS, RATES = slice(0, 3), slice(3, 6)  # columns of `twin.OUTPUTS`; then wheel speeds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +59,7 @@ def measured(clean: Drive, sensors: Sensors, snr: float, rng: np.random.Generato
     sd = noise_sd(clean.measurements, snr)
     y += sd * _noise(y.shape, sensors.correlation_time, clean.dt, rng)
     steps = (sensors.acceleration_step, sensors.rate_step, sensors.wheel_speed_step)
-    for columns, step in zip((ACCELERATIONS, RATES, slice(6, None)), steps, strict=True):
+    for columns, step in zip((ACCELERATIONS, RATES, WHEEL_SPEEDS), steps, strict=True):
         if step > 0.0:
             y[:, columns] = step * np.round(y[:, columns] / step)
     by_channel = dict(zip(OUTPUTS, sd.tolist(), strict=True))

@@ -116,8 +116,8 @@ def _qpos(model: mujoco.MjModel, states: Array) -> Array:
         return states[:, twin.STATES.index(name)]
 
     qpos = np.zeros((len(states), model.nq))
-    qpos[:, :3] = states[:, :3]
-    for row, angles in zip(qpos, states[:, 3:6], strict=True):
+    qpos[:, :3] = states[:, twin.POSITION]
+    for row, angles in zip(qpos, states[:, twin.ROTATION], strict=True):
         mujoco.mju_euler2Quat(row[3:7], np.ascontiguousarray(angles[::-1]), "zyx")
     for wheel in twin.WHEELS:
         qpos[:, model.joint(f"travel_{wheel}").qposadr[0]] = state(f"suspension_travel_{wheel}")
@@ -161,7 +161,7 @@ def _unit(vectors: Array) -> Array:
 
 def scene(subject: str, moved: Motion) -> rrb.Spatial3DView:
     """The view of the car on a ground grid, the eye behind its right shoulder and following it."""
-    start, yaw = moved.states[0, :3], moved.states[0, 5]
+    start, yaw = moved.states[0, twin.POSITION], moved.states[0, twin.X.yaw]
     turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     forces = f", tyre forces (1 m = {NEWTONS_PER_METRE / 1000:g} kN)"
     name = subject if moved.forces is None else subject + forces

@@ -15,12 +15,26 @@ from numpy.typing import NDArray
 from estimators.weigh.trip import Trip
 from scenarios.driving.driver import CREEP
 from scenarios.weighing.car import car_of
-from twin import INPUTS, OUTPUTS, STATES, PointMass, Twin, TwinError, U, Vehicle, X, Y
+from twin import (
+    BRAKE_TORQUES,
+    INPUTS,
+    OUTPUTS,
+    STATES,
+    TORQUES,
+    PointMass,
+    Twin,
+    TwinError,
+    U,
+    Vehicle,
+    X,
+    Y,
+)
 from twin.kernel import is_sound, read_states, step
 
 Array = NDArray[np.float64]
 
 GRAVITY = 9.81
+FIRST_TORQUE, FIRST_BRAKE, AFTER_TORQUES = TORQUES.start, BRAKE_TORQUES.start, TORQUES.stop
 HALF_AIR_DENSITY = 0.6  # [kg/m3]
 SPEEDS = (30.0, 50.0, 50.0, 70.0, 100.0)  # [km/h] that are allowed on a stretch
 STRETCH = (10.0, 40.0)  # [s] between two of them
@@ -159,10 +173,10 @@ def _drive(car, gravity, push, wanted, slope, wind, every, mass, wheel, drag_are
         brake = max(motor - wish, 0.0)
         force += (motor - force) * car.dt / 0.15
         stands = wanted[k] == 0.0 and speed < CREEP
-        u[1:9] = 0.0
+        u[FIRST_TORQUE:AFTER_TORQUES] = 0.0
         if stands:
             force = 0.0
-            u[5:9] = 500.0
+            u[FIRST_BRAKE:AFTER_TORQUES] = 500.0
         else:
             u[U.drive_torque_rl] = u[U.drive_torque_rr] = 0.5 * wheel * force
             u[U.brake_torque_fl] = u[U.brake_torque_fr] = 0.5 * wheel * BRAKE_FRONT * brake

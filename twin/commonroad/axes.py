@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.channels import WHEELS
+from twin.channels import OUTPUTS, WHEEL_SPEEDS, WHEELS
 from twin.commonroad.model import (
     AXLE_ROLL_RATE,
     AXLE_VY,
@@ -81,7 +81,7 @@ def move(car: MultiBody, x: Array, dx: Array) -> None:
 
 
 def measurements(x: Channels, rates: Channels) -> Array:
-    """The 10 `twin.OUTPUTS` of their 29 states and the rates of these."""
+    """The `twin.OUTPUTS` of their 29 states and the rates of these."""
     # Specific force in the axes that only yaw: acceleration less gravity
     force = (
         rates[VX] - x[YAW_RATE] * x[VY],
@@ -89,7 +89,10 @@ def measurements(x: Channels, rates: Channels) -> Array:
         GRAVITY - rates[VZ],
     )
     imu = _to_body(x[ROLL], -x[PITCH], force)
-    return np.array((*imu, *_body_rates(x), *x[WHEEL : WHEEL + 4]))
+    known = (*imu, *_body_rates(x), *x[WHEEL : WHEEL + 4])
+    found = np.full((len(OUTPUTS), *np.shape(rates[VX])), np.nan)
+    found[: WHEEL_SPEEDS.stop] = known
+    return found
 
 
 def _to_body(roll, pitch, v):

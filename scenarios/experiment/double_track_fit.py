@@ -1,11 +1,10 @@
 """Fits the benchmark's tyre curves to steady states of a twin.
 
-`python -m scenarios.tuning.double_track_fit CAR` writes models/double_track/CAR.toml. The twin is
-a black
-box here: it drives slow ramps of the hand wheel at constant speeds, and ramps of drive and brake
-torque straight ahead; its states, and the forces and loads of its tyres, are what a test bench
-would give. Slips are the double track's own, from hub velocities and wheel speeds, so that its
-curves hold what its kinematics lack (camber, elastic rolling radius, Ackermann).
+`python -m scenarios.experiment.double_track_fit CAR` writes models/double_track/CAR.toml. The
+twin is a black box here: it drives slow ramps of the hand wheel at constant speeds, and ramps of
+drive and brake torque straight ahead; its states, and the forces and loads of its tyres, are what a
+test bench would give. Slips are the double track's own, from hub velocities and wheel speeds, so
+that its curves hold what its kinematics lack (camber, elastic rolling radius, Ackermann).
 """
 
 import math
@@ -46,7 +45,7 @@ def path(car: str) -> Path:
 
 
 def fit(name: str) -> DoubleTrack:
-    """The double track of a car of the project."""
+    """Fits the double track of a car, by its name in `models` or its file."""
     vehicle = Vehicle.load(name)
     driver = driver_of(vehicle)
     twin = Twin(vehicle)
@@ -177,7 +176,7 @@ def write(name: str) -> Path:
             "across": one.across._asdict(),
         }
     content["made"] = {
-        "command": f"python -m scenarios.tuning.double_track_fit {name}",
+        "command": f"python -m scenarios.experiment.double_track_fit {name}",
         "versions": versions(),
     }
     FOLDER.mkdir(exist_ok=True)
