@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from dataclasses import replace
 
 import pytest
 
@@ -179,6 +180,72 @@ def test_result_of_a_tuning_is_on_file_with_what_made_it(tmp_path, monkeypatch):
 def test_what_cannot_be_tuned_is_named(tmp_path, experiment, estimator, changes, message):
     with pytest.raises(TwinError, match=message):
         tuning.tune(experiment.EXPERIMENT, estimator, tmp_path / "x.toml", evaluations=4, **changes)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("method", ["evolution", "random"])
+def test_other_methods_search_and_go_on_after_an_interruption(tmp_path, method):
+    aim = Objective(
+        name="bowl", gains=GAINS, cost=bowl, metric="depth", unit="1", worst=1e3, method=method
+    )
+    whole = tune.search(aim, 48, 1, tmp_path / "journal")
+    assert len(whole.points) == len(whole.costs) == 48
+    assert min(whole.costs) == pytest.approx(bowl(whole.evaluated))
+    with pytest.raises(Interrupted):
+        tune.search(replace(aim, cost=interrupted_after(22)), 48, 1, tmp_path / "journal")
+    assert tune.search(aim, 48, 1, tmp_path / "journal") == whole
+    assert not any(tmp_path.iterdir())
+
+
+def test_evolution_is_better_than_random_points_on_a_bowl(tmp_path):
+    aim = objective(gains=tuple(Gain(name=n, low=1.0, high=1e4, today=5.0) for n in "abcd"))
+    found = {
+        name: tune.search(replace(aim, method=name), 100, 1, tmp_path / name).cost
+        for name in ("evolution", "random")
+    }
+    assert found["evolution"] - 0.5 < 0.3 * (found["random"] - 0.5)
+
+
+def test_convergence_is_where_the_best_cost_fell():
+    assert tuning.best_after([3.0, 4.0, 2.0, 2.0, 1.0]) == {"1": 3.0, "3": 2.0, "5": 1.0}
+
+
+def test_held_out_vehicles_are_reported_and_not_tuned_on(tmp_path, monkeypatch):
+    seen = []
+
+    def scored(run):
+        seen.append(run.case.name)
+        slip = dict(run.gains)["yaw_rate"] / (100.0 if "laps" in run.case.name else 10.0)
+        return figures(sideslip__rmse=slip, mass__rmse_last_60s=0.0), ()
+
+    monkeypatch.setattr(tuning, "score", scored)
+    path = tmp_path / "a.toml"
+    result = tuning.tune(
+        laps.EXPERIMENT, "til", path, evaluations=4, on=("mismatched:laps",),
+        held_out=("mismatched:lane-change", "same:laps"),
+    )  # fmt: skip
+    made = tomllib.loads(path.read_text())["made"]
+    assert made["tuned_on"] == ["mismatched:laps"]
+    assert set(seen[:8]) == {"mismatched, laps"}
+    assert made["held_out"]["mismatched:lane-change"] == pytest.approx(10 * made["cost"], rel=1e-4)
+    assert made["held_out"]["same:laps"] == pytest.approx(made["cost"], rel=1e-4)
+    rows = {row.case: row.median for row in result.rows if row.quantity == "cost"}
+    assert rows["held out, same:laps"] == pytest.approx(made["cost"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"on": ("mars:laps",)}, "'mars:laps' is no real vehicle on a drive; allowed: VEHICLE:DR"),
+        ({"held_out": ("same:moon",)}, "'same:moon' is no real vehicle on a drive"),
+        ({"on": ("same:laps",), "held_out": ("same:laps",)}, "same:laps is tuned on and held out"),
+        ({"on": ("same:laps", "commonroad:laps")}, "are of 2 cars; allowed: of one car"),
+        ({"method": "luck"}, "method is 'luck'; allowed: bayes, evolution, random"),
+    ],
+)
+def test_what_cannot_be_held_out_is_named(tmp_path, changes, message):
+    with pytest.raises(TwinError, match=message):
+        tuning.tune(laps.EXPERIMENT, "til", tmp_path / "x.toml", evaluations=4, **changes)
     assert list(tmp_path.iterdir()) == []
 
 

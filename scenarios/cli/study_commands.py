@@ -13,6 +13,7 @@ from scenarios.cli.options import (
     STANDARD_OUTPUT,
     Mistake,
     Name,
+    Names,
     OutputFile,
     count_option,
     dask_option,
@@ -199,6 +200,27 @@ def limits(name: str, snr: float | None, duration: float | None, json_path: Path
     help="Look for a gain within other bounds than its own; may be given several times.",
 )
 @click.option("--cost", default="", help="What is minimised: robust or, where it has one, paper.")
+@click.option(
+    "--on",
+    type=Names(),
+    default="",
+    metavar="VEHICLE:DRIVE,...",
+    help="Real vehicles and drives that are tuned on, as in mismatched:laps.",
+)
+@click.option(
+    "--hold-out",
+    type=Names(),
+    default="",
+    metavar="VEHICLE:DRIVE,...",
+    help="Those that the gains found are reported on, and that the search does not see.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(("bayes", "evolution", "random")),
+    default="bayes",
+    show_default=True,
+    help="Bayesian optimisation, differential evolution or random points.",
+)
 @json_option
 def tune(
     name: str,
@@ -208,11 +230,14 @@ def tune(
     out: Path | None,
     bounds: Sequence[tuple[str, float, float]],
     cost: str,
+    on: tuple[str, ...],
+    hold_out: tuple[str, ...],
+    method: str,
     json_path: Path | None,
 ) -> None:
     """Choose the gains of an estimator of scenario NAME, on seeds that no result is reported on.
 
-    Bayesian optimisation, in batches of four; FILE holds the best point tried and the one predicted
+    A search in batches of four; FILE holds the best point tried and the one predicted
     best. A tuning that was interrupted goes on from the journal beside FILE.
     """
     path = out or Path("out", f"tune-{name}.toml")
@@ -225,6 +250,9 @@ def tune(
         jobs=jobs,
         bounds={gain: (low, high) for gain, low, high in bounds},
         cost=cost,
+        on=on,
+        held_out=hold_out,
+        method=method,
     )
     report(result, json_path)
 

@@ -200,6 +200,8 @@ class Cost(NamedTuple):
         metric: its name; its unit is 1.
         worst: what gains cost with which the estimator blows up [-].
         made: what else belongs into the file of gains: seeds, starts.
+        on: the same cost of other real vehicles and drives, by their names; None: it has no others.
+        held_out: names that a tuning is reported on unless it is told others.
     """
 
     runs: Callable[["Experiment", str, tuple[tuple[str, float], ...]], list["Run"]]
@@ -207,6 +209,8 @@ class Cost(NamedTuple):
     metric: str
     worst: float
     made: Mapping[str, Any]
+    on: "Callable[[Sequence[str]], Cost] | None" = None
+    held_out: tuple[str, ...] = ()
 
 
 class Study(NamedTuple):

@@ -12,7 +12,7 @@ track, one is fitted.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -26,7 +26,8 @@ from scenarios.experiment import double_track_fit, gains_file
 from scenarios.experiment.experiment import Case, Cost, Experiment, Gain, Recipe, Run, Score
 from scenarios.experiment.metrics import sideslip_and_mass
 from scenarios.experiment.plants import CommonRoadCar, SimulatedCar
-from twin import Drive, Twin, Vehicle
+from scenarios.plants.mismatch import MISMATCHES
+from twin import Drive, Twin, TwinError, Vehicle
 
 TWIN, BMW = "sports_car", "bmw_320i"
 CASE = "mismatched"
@@ -222,26 +223,50 @@ DURATIONS: Mapping[str, Mapping[DriveName, float]] = {
     "robust": {"laps": LAP, "lane-change": 80.0},
     "paper": {"laps": LAP},
 }  # [s]
+# What no tuning sees unless it is told to: other real vehicles, both drives
+HELD_OUT = ("all-scales:laps", "all-scales:lane-change", "cornering_stiffness-10:laps",
+            "brake+5:lane-change")  # fmt: skip
 SIDESLIP, MASS_SHARE = 0.1, 0.01  # [deg], [-]: errors that count as one
 K_BETA = 100.0  # TiL Eq. (26)
 
 
 def _runs(
-    cost: str, experiment: Experiment, estimator: str, values: tuple[tuple[str, float], ...]
+    cost: str,
+    names: tuple[str, ...],
+    experiment: Experiment,
+    estimator: str,
+    values: tuple[tuple[str, float], ...],
 ) -> list[Run]:
-    """A run for each drive and start."""
+    """A run for each real vehicle and drive, and each start."""
+    car = experiment.cases[0].twin
     return [
         Run(
             experiment=experiment,
-            case=replace(case(CASE, drive, experiment.cases[0].twin), initial=(("mass", start),)),
+            case=replace(case(vehicle, drive, car), initial=(("mass", start),)),
             estimator=estimator,
             seed=SEED,
-            duration=duration,
+            duration=DURATIONS["robust"][drive],
             gains=values,
         )
-        for drive, duration in DURATIONS[cost].items()
+        for vehicle, drive in map(vehicle_and_drive, names)
         for start in STARTS[cost]
     ]
+
+
+def vehicle_and_drive(name: str) -> tuple[str, DriveName]:
+    """Of a name as in `mismatched:laps`.
+
+    Raises:
+        TwinError: an unknown vehicle or drive.
+    """
+    vehicle, _, drive = name.partition(":")
+    vehicles = (*MISMATCHES, COMMONROAD)
+    if vehicle not in vehicles or drive not in get_args(DriveName):
+        raise TwinError(
+            f"tune: {name!r} is no real vehicle on a drive; allowed: VEHICLE:DRIVE of "
+            f"{', '.join(vehicles)} and {', '.join(get_args(DriveName))}"
+        )
+    return vehicle, "laps" if drive == "laps" else "lane-change"
 
 
 def _robust(scored: Sequence[Sequence[Score]], runs: Sequence[Run]) -> float:
@@ -265,16 +290,27 @@ def _figure(scores: Sequence[Score], quantity: str, metric: str) -> float:
 
 
 def _cost(
-    name: str, of: Callable[[Sequence[Sequence[Score]], Sequence[Run]], float], worst: float
+    name: str,
+    of: Callable[[Sequence[Sequence[Score]], Sequence[Run]], float],
+    worst: float,
+    names: Sequence[str] = (),
 ) -> Cost:
+    names = tuple(names) or tuple(f"{CASE}:{drive}" for drive in DURATIONS[name])
+    others = {vehicle_and_drive(one)[0] == COMMONROAD for one in names}
+    if len(others) > 1:
+        raise TwinError(f"tune: {', '.join(names)} are of 2 cars; allowed: of one car")
     made = {
-        "real_vehicle": CASE,
+        "tuned_on": list(names),
         "seed": SEED,
         "snr": SNR,
         "starts": list(STARTS[name]),
-        "seconds": list(DURATIONS[name].values()),
+        "seconds": [DURATIONS["robust"][vehicle_and_drive(one)[1]] for one in names],
     }
-    return Cost(partial(_runs, name), of, f"{name}_cost", worst, made)
+    held_out = () if True in others else HELD_OUT
+    return Cost(
+        partial(_runs, name, names), of, f"{name}_cost", worst, made,
+        on=partial(_cost, name, of, worst), held_out=tuple(n for n in held_out if n not in names),
+    )  # fmt: skip
 
 
 COSTS = {"robust": _cost("robust", _robust, 1e3), "paper": _cost("paper", _paper, 1e4)}
