@@ -12,7 +12,9 @@ from twin import INPUTS, OUTPUTS, PARAMETERS, STATES, TYRE_OUTPUTS, Twin, TwinEr
 DELTAS = np.array(
     [
         *(300.0, -0.2, 0.03, 0.05, 50.0, 400.0, 390.0, 5.0, -20.0, 4.0),
-        *(-0.1, 0.2, 0.3, 0.1, -0.2, 0.2, -0.1, 0.1, 300.0, -200.0),
+        *(-0.1, 0.2, 0.3, 0.1, -0.2, 0.2, -0.1, 0.1),
+        *(0.1, -0.05, -0.01, 0.2, -0.1, 0.3, 0.05, -0.1, 0.2),
+        *(0.1, 0.03, 0.2, 0.1, 0.01, 1e-6, 0.01, -0.01, 300.0, -200.0),
     ]
 )
 
@@ -34,7 +36,7 @@ def test_names_fit_the_arrays():
     twin = suv()
     assert (twin.inputs, twin.outputs) == (INPUTS, OUTPUTS)
     assert (twin.states, twin.parameters) == (STATES, PARAMETERS)
-    assert (len(INPUTS), len(OUTPUTS), len(STATES), len(PARAMETERS)) == (13, 10, 28, 20)
+    assert (len(INPUTS), len(OUTPUTS), len(STATES), len(PARAMETERS)) == (13, 10, 28, 37)
     assert twin.step(np.zeros(13)).shape == (10,)
     assert twin.read_states().shape == (28,)
     assert twin.tyre_forces().shape == (4, len(TYRE_OUTPUTS))
@@ -164,7 +166,7 @@ def test_input_of_another_shape_is_refused(shape):
     ("method", "size"),
     [
         ("correct", 28),
-        ("set_parameters", 20),
+        ("set_parameters", 37),
     ],
 )
 def test_corrections_and_parameters_are_finite_numbers_of_the_right_shape(method, size):

@@ -8,11 +8,15 @@ from numpy.typing import NDArray
 
 from twin.car_record import DATA_VIEWS, MODEL_VIEWS
 from twin.channels import CHANNEL, OUTPUTS, WHEELS
-from twin.parameters import FORCES, SCALES
+from twin.parameters import PARAMETER
 from twin.scale_setter import bind_factors
 from twin.scales import AXLES, scale_shares
 from twin.tyre.four_tyres import table_of
 
+# Of the parameters that are no load
+_NOMINAL = tuple(
+    1.0 if record.kind == "scale" else 0.0 for record in PARAMETER.values() if record.kind != "load"
+)
 NUMERICS = ("steering_ratio", "ackermann", "drag_area", *(f"lift_area_{axle}" for axle in AXLES))
 
 
@@ -36,7 +40,9 @@ def bind(
     wheels = [model.body(f"wheel_{w}").id for w in WHEELS]
     travels = [model.joint(f"travel_{w}").id for w in WHEELS]
     spins = [model.joint(f"spin_{w}").id for w in WHEELS]
-    hubs = model.body_pos[model.body_parentid[wheels]]
+    hub_bodies = model.body_parentid[wheels]
+    hubs = model.body_pos[hub_bodies]
+    other_mass = model.body_subtreemass[[0, chassis]] - model.body_mass[chassis]
     # MuJoCo takes the inertial frame for the body frame where the file has them equal.
     model.body_sameframe[chassis] = 0
     fields = {
@@ -47,6 +53,7 @@ def bind(
         "chassis": chassis,
         "wheel": np.arange(len(WHEELS)),
         "wheel_body": wheels,
+        "hub_body": hub_bodies,
         "travel_joint": travels,
         "travel_qpos": model.jnt_qposadr[travels],
         "travel_dof": model.jnt_dofadr[travels],
@@ -64,9 +71,19 @@ def bind(
         "brake_share": 1.0,
         "axle": hubs[:, 0].reshape(2, 2).mean(axis=1),
         "spin_inertia": model.body_inertia[wheels, 1],
-        "nominal": [*_body(model, chassis), *(1.0 for _ in SCALES), *(0.0 for _ in FORCES)],
+        "nominal": [*_body(model, chassis), *_NOMINAL],
+        "damping": model.dof_damping[model.jnt_dofadr[travels]],
+        "nominal_unsprung": [
+            model.body_mass[hub_bodies],
+            model.body_mass[wheels],
+            *model.body_inertia[wheels].T,
+        ],
+        "nominal_axis": model.jnt_axis[travels],
+        "nominal_lift_area": [model.numeric(f"lift_area_{axle}").data[0] for axle in AXLES],
+        "nominal_other_mass": other_mass,
+        "input_state": np.nan,
         "compiled_inertia": np.append(model.body_inertia[chassis], model.body_iquat[chassis]),
-        "other_mass": model.body_subtreemass[[0, chassis]] - model.body_mass[chassis],
+        "other_mass": other_mass,
         "side": np.array([1.0, -1.0, 1.0, -1.0]) * tyres["side"],
         "tyres": table_of(tyres),
     }

@@ -17,6 +17,7 @@ DATA_VIEWS = (
 )
 MODEL_VIEWS = (
     *("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_subtreemass", "body_quat"),
+    *("jnt_axis", "dof_damping"),
 )
 _PER_WHEEL = (len(WHEELS),)
 
@@ -27,6 +28,7 @@ CAR_DTYPE = np.dtype(
         ("chassis", np.int64),
         ("wheel", np.int64, _PER_WHEEL),  # 0 to 3
         ("wheel_body", np.int64, _PER_WHEEL),
+        ("hub_body", np.int64, _PER_WHEEL),
         ("travel_joint", np.int64, _PER_WHEEL),
         ("travel_qpos", np.int64, _PER_WHEEL),
         ("travel_dof", np.int64, _PER_WHEEL),
@@ -53,6 +55,12 @@ CAR_DTYPE = np.dtype(
         ("factor_nominal", np.float64, (MOST_FACTORS,)),
         ("factor_parameter", np.int64, (MOST_FACTORS,)),
         ("factor_divides", np.int64, (MOST_FACTORS,)),
+        ("damping", np.float64, _PER_WHEEL),  # [N s/m], of bump and rebound the mean
+        # as the files have it, see `twin.parts`: masses of hub and wheel, the wheel's moments
+        ("nominal_unsprung", np.float64, (5, *_PER_WHEEL)),
+        ("nominal_axis", np.float64, (*_PER_WHEEL, 3)),  # of each travel
+        ("nominal_lift_area", np.float64, (len(AXLES),)),  # [m2]
+        ("nominal_other_mass", np.float64, (2,)),
         ("compiled_inertia", np.float64, (7,)),  # principal moments, and their axes' quaternion
         ("other_mass", np.float64, (2,)),  # of the world's and the chassis' trees, without chassis
         ("side", np.float64, _PER_WHEEL),  # 1 for a tyre as measured, -1 for a mirrored one
@@ -64,6 +72,10 @@ CAR_DTYPE = np.dtype(
         # ours, not MuJoCo's
         ("tyre_state", np.float64, (*_PER_WHEEL, 3)),  # see `twin.tyre.contact`
         ("tyre_output", np.float64, (*_PER_WHEEL, len(TYRE_OUTPUTS))),
+        # hand wheel and torques, smoothed: what makes their delay; NaN before the first sample
+        ("input_state", np.float64, (1 + 2 * len(WHEELS),)),
+        ("inputs", np.float64, (1 + 2 * len(WHEELS),)),  # hand wheel and torques as they act
+        ("front_force", np.float64, (2,)),  # lateral, of the step before [N]
         ("parameters", np.float64, (len(PARAMETERS),)),  # deltas in force
         # room to find the principal axes of the chassis
         ("tensor", np.float64, (3, 3)),

@@ -12,7 +12,8 @@ from numba import njit, types
 
 from twin.car_record import CAR
 from twin.chassis import set_load
-from twin.parameters import SCALE_FACTORS
+from twin.parameters import AXLE_FORCES
+from twin.parts import restore_dampers, set_parts
 from twin.scale_setter import set_scales
 from twin.states import copy_states, correct_states, states_are_sound
 from twin.stepping import step_car
@@ -75,8 +76,10 @@ def set_parameters(car, p):
             one that a rigid body can have, scales stay within their bounds.
     """
     set_load(car, p.ctypes)
+    restore_dampers(car)
     set_scales(car, p.ctypes)
-    for i in range(SCALE_FACTORS.stop, p.size):
+    set_parts(car, p.ctypes)
+    for i in range(AXLE_FORCES.start, AXLE_FORCES.stop):
         car.parameters[i] = p[i]
 
 

@@ -22,7 +22,7 @@ class Parameter:
 
     Attributes:
         name: unique.
-        kind: "load", "scale" (relative) or "force".
+        kind: "load", "scale" (relative), "offset" (absolute, zero in the files) or "force".
         unit: of the delta.
         prior_sd: standard deviation of the delta before the first sample; 0: not estimated.
         step: of finite differences: a tenth or less of what a full car changes, large beside
@@ -34,7 +34,7 @@ class Parameter:
     """
 
     name: str
-    kind: Literal["load", "scale", "force"]
+    kind: Literal["load", "scale", "offset", "force"]
     unit: str
     prior_sd: float
     step: float
@@ -95,6 +95,59 @@ _SCALES = tuple(
          "brake hard, with bends besides"),
     )
 )  # fmt: skip
+# What cars of one type differ in besides: tolerances of manufacture, wear and pressure of tyres,
+# bushings; sources of the spreads in scenarios/plants/random_car.toml. Columns: name, prior_sd,
+# step, signal, words, advice, low, high. First factors, of one axle beside those of both above
+_PART_SCALES = tuple(
+    Parameter(row[0], "scale", "1", *row[1:])
+    for row in (
+        ("tyre_stiffness", 0.08, 0.01, "az",
+         "the vertical stiffness of the tyres", "drive over bumps", -0.6, 1.5),
+        ("front_cornering_stiffness", 0.1, 0.01, "yaw_rate",
+         "the cornering stiffness of the front tyres beside the rear ones", "drive bends",
+         -0.6, 1.5),
+        ("rolling_radius", 0.008, 0.001, "wheel_speed_fl",
+         "the rolling radius of the tyres", "drive straight ahead", -0.1, 0.1),
+        ("front_anti_roll", 0.12, 0.02, "roll_rate",
+         "the front anti-roll bar", "drive bends", -0.6, 2.0),
+        ("rear_anti_roll", 0.12, 0.02, "roll_rate",
+         "the rear anti-roll bar", "drive bends", -0.6, 2.0),
+        ("front_spring", 0.05, 0.01, "pitch_rate",
+         "the front springs beside the rear ones", "brake and accelerate", -0.6, 1.5),
+        ("front_damper", 0.15, 0.02, "pitch_rate",
+         "the front dampers beside the rear ones", "drive over bumps", -0.6, 1.5),
+        ("front_brake_torque", 0.04, 0.005, "wheel_speed_fl",
+         "the front brakes beside the rear ones", "brake hard", -0.6, 1.5),
+        ("steering_ratio", 0.02, 0.005, "yaw_rate",
+         "the steering ratio", "drive bends", -0.6, 1.5),
+    )
+)  # fmt: skip
+# Then what no factor is. Columns: name, unit, and the same
+_OFFSETS = tuple(
+    Parameter(row[0], "offset", *row[1:])
+    for row in (
+        ("unsprung_mass", "1", 0.08, 0.02, "az",
+         "the mass of wheels and hubs", "drive over bumps", -0.6, 1.5),
+        ("roll_centre", "1", 0.2, 0.02, "roll_rate",
+         "the heights of the roll centres", "drive bends", -2.0, 4.0),
+        ("lift", "m2", 0.15, 0.05, "az",
+         "the downforce on both axles, as an area", "drive fast", -5.0, 5.0),
+        ("damper_asymmetry", "1", 0.3, 0.02, "az",
+         "by how much the dampers are softer in bump than in rebound", "drive over bumps",
+         -0.8, 0.8),
+        ("steering_offset", "rad", 0.025, 0.005, "yaw_rate",
+         "the offset of the hand wheel's angle", "drive straight ahead", -1.0, 1.0),
+        ("compliance_steer", "rad/N", 1.2e-6, 1e-7, "yaw_rate",
+         "by how much lateral force steers the front wheels out of the bend", "drive bends",
+         -1e-5, 1e-5),
+        ("steering_delay", "s", 0.015, 0.002, "yaw_rate",
+         "the delay of the road wheels behind the told hand wheel", "steer quickly to and fro",
+         -0.1, 0.1),
+        ("torque_delay", "s", 0.03, 0.002, "ax",
+         "the delay of the torques behind the told ones", "accelerate and brake abruptly",
+         -0.2, 0.2),
+    )
+)  # fmt: skip
 # Lateral forces on the axles, at the road, that their tyres do not account for; to the left
 _FORCES = tuple(
     Parameter(f"axle_force_{axle}", "force", "N", 0.0, 100.0, "ay",
@@ -102,11 +155,15 @@ _FORCES = tuple(
     for axle in ("front", "rear")
 )  # fmt: skip
 
-PARAMETER: Mapping[str, Parameter] = {p.name: p for p in (*_LOAD, *_SCALES, *_FORCES)}
+PARAMETER: Mapping[str, Parameter] = {
+    p.name: p for p in (*_LOAD, *_SCALES, *_PART_SCALES, *_OFFSETS, *_FORCES)
+}
 """The record of each name; compiled code knows parameters by the indices below."""
 
 LOAD = tuple(p.name for p in _LOAD)
 SCALES = tuple(p.name for p in _SCALES)
+PARTS = tuple(p.name for p in (*_PART_SCALES, *_OFFSETS))
+FACTORS = tuple(p.name for p in (*_SCALES, *_PART_SCALES))
 FORCES = tuple(p.name for p in _FORCES)
 PARAMETERS = tuple(PARAMETER)
 # Indices by name, as in `p[P.mass]`, and blocks
@@ -114,4 +171,7 @@ P = namedtuple("P", PARAMETERS)._make(range(len(PARAMETERS)))
 CENTRE_OF_MASS = span(PARAMETERS, ("cm_x", "cm_y", "cm_z"))
 INERTIA = span(PARAMETERS, ("Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz"))
 SCALE_FACTORS = span(PARAMETERS, SCALES)
+PART_CHANGES = span(PARAMETERS, PARTS)
+ALL_FACTORS = span(PARAMETERS, FACTORS)
+OFFSETS = span(PARAMETERS, tuple(p.name for p in _OFFSETS))
 AXLE_FORCES = span(PARAMETERS, FORCES)

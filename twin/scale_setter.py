@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from twin.car_record import CAR
 from twin.compiled.boundary import VECTOR, behind
 from twin.compiled.simd import pointer
-from twin.parameters import PARAMETER, SCALE_FACTORS, SCALES, P
+from twin.parameters import ALL_FACTORS, FACTORS, PARAMETER, P
 from twin.scales import TARGETS, Target, places
 from twin.tyre.four_tyres import NAMES
 
@@ -24,7 +24,7 @@ def bind_factors(car: NDArray[np.void], model: mujoco.MjModel) -> None:
         model: of the car.
     """
     k = 0
-    for name in SCALES:
+    for name in FACTORS:
         for target in TARGETS[name]:
             numbers = _array(car, model, target)
             for place in places(model, target):
@@ -51,7 +51,7 @@ def set_scales(car, p):
     """The part of `twin.kernel.set_parameters` that scales."""
     now = car.parameters
     changed = False
-    for i in range(SCALE_FACTORS.start, SCALE_FACTORS.stop):
+    for i in range(ALL_FACTORS.start, ALL_FACTORS.stop):
         p[i] = min(max(p[i], _LOW[i]), _HIGH[i])
         changed = changed or p[i] != now[i]
         now[i] = p[i]

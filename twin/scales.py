@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.channels import WHEELS
-from twin.parameters import SCALES
+from twin.parameters import FACTORS
 
 AXLES = ("front", "rear")
 Array = NDArray[np.float64]
@@ -48,6 +48,8 @@ _TYRES = {
     "combined_slip": _tyre("lyka"),  # how soon lateral force is lost to slip
     "load_of_largest_stiffness": _tyre("pky2"),  # large: stiffness in proportion to load
     "lateral_curvature": _tyre("ley"),
+    "tyre_stiffness": _tyre("vertical_stiffness"),
+    "rolling_radius": _tyre("unloaded_radius"),
 }
 _ALL_TARGETS = {
     **_TYRES,
@@ -58,9 +60,15 @@ _ALL_TARGETS = {
         Target("model", "qpos_spring", divides=True),
         Target("model", "tendon_stiffness"),
     ),
+    "front_spring": (
+        Target("model", "jnt_stiffness", "front"),
+        Target("model", "qpos_spring", "front", divides=True),
+    ),
     "damper": (Target("model", "dof_damping"),),
+    "front_damper": (Target("model", "dof_damping", "front"),),
     "drive_torque": (Target("share", "drive_share"),),
     "brake_torque": (Target("share", "brake_share"),),
+    "front_brake_torque": (Target("share", "brake_share", "front"),),
     **{
         f"{axle}_{name}": tuple(target._replace(axle=axle) for target in targets)
         for axle in AXLES
@@ -70,12 +78,12 @@ _ALL_TARGETS = {
     "steering_ratio": (Target("number", "steering_ratio"),),
 }
 TARGETS: Mapping[str, tuple[Target, ...]] = {
-    name: _ALL_TARGETS[name] for name in (*SCALES, *_ALL_TARGETS)
+    name: _ALL_TARGETS[name] for name in (*FACTORS, *_ALL_TARGETS)
 }
-"""By the name of a scale; those of `twin.SCALES`, the first, are parameters of a twin too."""
+"""By the name of a scale; those of `twin.FACTORS`, the first, are parameters of a twin too."""
 
 VEHICLE_SCALES = tuple(TARGETS)
-MOST_FACTORS = 4 * sum(len(TARGETS[name]) for name in SCALES)
+MOST_FACTORS = 4 * sum(len(TARGETS[name]) for name in FACTORS)
 """On how many numbers of a running twin parameters act at most."""
 
 

@@ -5,7 +5,7 @@ import math
 from numba import types
 
 from twin.car_record import CAR
-from twin.channels import OUTPUTS, TYRE_OUTPUTS, U
+from twin.channels import OUTPUTS, TYRE, TYRE_OUTPUTS, WHEELS, U
 from twin.compiled.boundary import VECTOR, behind
 from twin.compiled.elementary import clip
 from twin.compiled.libmujoco import mj_step1, mj_step2
@@ -24,18 +24,60 @@ from twin.tyre.contact import (
 from twin.tyre.four_tyres import four_tyres
 
 AIR_DENSITY = 1.2  # [kg/m3]
+# An input is late by as much of its change over this time as its delay is of it [s]; chosen: faster
+# than what a driver does, slower than the noise of a torque
+SMOOTHING = 0.02
+STICK = 0.02  # rate of travel at which bump and rebound are half told apart [m/s]; chosen
 STATES = 3  # columns of the tyre state
+
+
+@inlined
+def _late(car, k, value, delay):
+    """Input k by its delay later, first-order; of a negative delay, earlier."""
+    smooth = car.input_state[k]
+    if math.isnan(smooth):
+        smooth = value
+    late = value - delay / SMOOTHING * (value - smooth)
+    car.input_state[k] = smooth + (value - smooth) * car.dt / SMOOTHING
+    return late
+
+
+@inlined
+def _delay(car, u):
+    """Fills hand wheel and torques of the car as they act, of those told."""
+    p, acting = car.parameters, car.inputs
+    acting[0] = _late(car, 0, u[U.steering_wheel_angle], p[P.steering_delay])
+    for w in range(len(WHEELS)):
+        acting[1 + w] = _late(car, 1 + w, u[U.drive_torque_fl + w], p[P.torque_delay])
+        brake = _late(car, 5 + w, u[U.brake_torque_fl + w], p[P.torque_delay])
+        acting[5 + w] = max(brake, 0.0)
+
+
+@inlined
+def _damp(car):
+    """Sets the dampers to bump or rebound, where these differ."""
+    asymmetry = car.parameters[P.damper_asymmetry]
+    if asymmetry == 0.0:
+        return
+    damping, speed = pointer(car.dof_damping), pointer(car.qvel)
+    for w in range(len(WHEELS)):
+        rate = speed[car.travel_dof[w]]
+        share = asymmetry * rate / (abs(rate) + STICK)
+        damping[car.travel_dof[w]] = car.damping[w] * (1.0 - share)
 
 
 @inlined
 def _steer(car, hand_wheel):
     """Turns the front wheels: steering is an input, no degree of freedom."""
+    hand_wheel = hand_wheel - car.parameters[P.steering_offset]
+    compliance = car.parameters[P.compliance_steer]
     tangent = math.tan(hand_wheel / car.steering_ratio)
     inner = 0.5 * car.ackermann * car.track / car.wheelbase * tangent
     body_quat = pointer(car.body_quat)
     for w in range(2):
         side = 1.0 if w == 0 else -1.0
-        half = 0.5 * math.atan(tangent / (1.0 - side * inner))
+        angle = math.atan(tangent / (1.0 - side * inner))
+        half = 0.5 * (angle - compliance * car.front_force[w])
         quat = 4 * car.wheel_body[w]
         body_quat[quat] = math.cos(half)
         body_quat[quat + 3] = math.sin(half)
@@ -157,6 +199,8 @@ def _wheels(car, drive, brake, road, normal):
     scatter(state, wheels, STATES, ROAD, road)
     for k in range(len(TYRE_OUTPUTS)):
         scatter(outputs, wheels, len(TYRE_OUTPUTS), k, output[k])
+    for w in range(2):
+        car.front_force[w] = car.tyre_output[w, TYRE.fy]
 
     _push(car, centre, force, moment)
     applied, spins = pointer(car.qfrc_applied), car.spin_dof.ctypes
@@ -172,7 +216,9 @@ def _wheels(car, drive, brake, road, normal):
 @behind(types.void, CAR, VECTOR, VECTOR)
 def step_car(car, u, y):
     """See `twin.kernel.step`."""
-    _steer(car, u[U.steering_wheel_angle])
+    _delay(car, u)
+    _steer(car, car.inputs[0])
+    _damp(car)
     mj_step1(car.model, car.data)
     applied = pointer(car.qfrc_applied)
     for i in range(6):
@@ -180,8 +226,8 @@ def step_car(car, u, y):
     _air(car)
     road = load(u, U.road_height_fl)
     _axle_forces(car, 0.25 * _total(road))
-    drive = load(u, U.drive_torque_fl) * load(car.drive_share.ctypes, 0)
-    brake = load(u, U.brake_torque_fl) * load(car.brake_share.ctypes, 0)
+    drive = load(car.inputs.ctypes, 1) * load(car.drive_share.ctypes, 0)
+    brake = load(car.inputs.ctypes, 5) * load(car.brake_share.ctypes, 0)
     _wheels(car, drive, brake, road, _road_normal(car, unpack(road)))
     mj_step2(car.model, car.data)
     sensordata = pointer(car.sensordata)

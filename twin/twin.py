@@ -24,6 +24,7 @@ from twin.channels import (
 from twin.errors import TwinError
 from twin.parameters import PARAMETERS
 from twin.tyre.contact import ROAD
+from twin.tyre.four_tyres import NAMES
 from twin.tyre.radius import effective_radius
 
 Array = NDArray[np.float64]
@@ -36,7 +37,9 @@ class Snapshot(NamedTuple):
 
     state: Array  # MuJoCo's integration state
     tyre_state: Array  # (4, 3)
-    parameters: Array  # (20,)
+    input_state: Array  # (9,)
+    front_force: Array  # (2,)
+    parameters: Array  # (np,)
 
 
 class Twin:
@@ -107,6 +110,9 @@ class Twin:
             rates[0] = normal @ self.data.qacc[:3]  # a free car runs down its slope
             return rates
 
+        tyres = self._tyres.copy()
+        for name in ("vertical_stiffness", "unloaded_radius"):  # which its radius hangs on
+            tyres[name] = self.car.tyres[NAMES.index(name)]
         # Newton's method: scipy's root would keep this twin and its memory alive in a cycle
         residual = np.inf
         for _ in range(SETTLING_STEPS):
@@ -121,9 +127,7 @@ class Twin:
                 break
             accelerations(pose)
             loads = self.car.tyre_output[:, TYRE.fz]  # the rolling radius hangs on them, if weakly
-            spin[:] = [
-                speed / effective_radius(t, z) for t, z in zip(self._tyres, loads, strict=True)
-            ]
+            spin[:] = [speed / effective_radius(t, z) for t, z in zip(tyres, loads, strict=True)]
         if not residual < 1e-3:
             raise TwinError(
                 f"{self.vehicle.source}: the car does not settle on its wheels at {speed} m/s; "
@@ -167,6 +171,8 @@ class Twin:
         data.qvel[car.spin_dof] = spin
         car.tyre_state[:, :ROAD] = 0.0
         car.tyre_state[:, ROAD] = road
+        car.input_state[:] = np.nan
+        car.front_force[:] = 0.0
 
     def step(self, u: ArrayLike) -> Array:
         """Advances by one step: TiL Eq. (1).
@@ -211,12 +217,21 @@ class Twin:
         """Everything that decides the future; a replay from it is bit-exact."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return Snapshot(state, self.car.tyre_state.copy(), self.car.parameters.copy())
+        car = self.car
+        return Snapshot(
+            state=state,
+            tyre_state=car.tyre_state.copy(),
+            input_state=car.input_state.copy(),
+            front_force=car.front_force.copy(),
+            parameters=car.parameters.copy(),
+        )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Goes back to a snapshot of a twin of the same vehicle."""
         mujoco.mj_setState(self.model, self.data, snapshot.state, _STATE)
         self.car.tyre_state[:] = snapshot.tyre_state
+        self.car.input_state[:] = snapshot.input_state
+        self.car.front_force[:] = snapshot.front_force
         kernel.set_parameters(self.car, snapshot.parameters.copy())
 
     def fingerprint(self) -> str:
