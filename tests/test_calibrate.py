@@ -136,6 +136,18 @@ def test_command_writes_values_intervals_and_where_they_come_from(log, tmp_path,
     assert sorted(tmp_path.iterdir()) == [out, file]
 
 
+def test_factors_stay_what_was_found_beside_a_freed_inertia(log, tmp_path):
+    """A running twin has parameters of the same names, which are not those of its files."""
+    file, out = tmp_path / "log.parquet", tmp_path / "car.toml"
+    log.save(file)
+    free = "front_cornering_stiffness,Jzz"
+    command = ["calibrate", str(file), "--vehicle", "suv", "--free", free, "--evaluations", "3"]
+    assert main([*command, "--out", str(out)]) == 0
+    found = calibrate.read(out)
+    assert 0.6 < found["front_cornering_stiffness"] < 1.1
+    assert Vehicle.load(out).compile() is not None
+
+
 def test_command_leaves_nothing_after_a_mistake(log, tmp_path, capsys):
     file, out = tmp_path / "log.parquet", tmp_path / "car.toml"
     log.save(file)

@@ -179,7 +179,9 @@ def _as_driven(task: Task, found: Fit) -> tuple[Task, Fit]:
         return task, found
     twin = Twin(candidate.vehicle.scaled(**candidate.of("scale")))
     asked = [load.get(name, 0.0) for name in twin.parameters]
-    kept = dict(zip(twin.parameters, twin.set_parameters(asked).tolist(), strict=True))
+    given = zip(twin.parameters, twin.set_parameters(asked).tolist(), strict=True)
+    # what the car's files are scaled by shares names with parameters of a running twin
+    kept = {name: value for name, value in given if name in FREE and FREE[name].kind == "load"}
     lifted = {n: v for n, v in kept.items() if v != load.get(n, 0.0) and n not in task.free}
     values = [kept.get(n, v) for n, v in zip(task.free, found.values.tolist(), strict=True)]
     known = {**task.candidate.values, **lifted}
