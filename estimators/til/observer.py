@@ -227,10 +227,11 @@ class Observer:
         states, parameters, outputs = _histories(twin, n)
         trustworthy = np.ones(n, dtype=np.bool_)
         extended = np.empty((n, *twin.car.tyre_output.shape))
+        variance = np.empty((n, self._laws.size))
         done = _run(
             twin.car, self._gains, self._laws, self._memory, self._every,
             self._follower or NOT_FOLLOWED, given, states, parameters, outputs, extended,
-            trustworthy,
+            variance, trustworthy,
         )  # fmt: skip
         if done < n:
             raise TwinError(
@@ -245,6 +246,7 @@ class Observer:
             extended=extended.reshape(n, -1),
             nominal=twin.car.nominal.copy(),
             estimated=self._estimated,
+            sd=self._sd(variance),
             trustworthy=trustworthy,
         )
 
@@ -252,12 +254,14 @@ class Observer:
         twin = self.twin
         states, parameters, outputs = _histories(twin, len(drive))
         trustworthy = np.empty(len(drive), dtype=np.bool_)
+        variance = np.empty((len(drive), self._laws.size))
         for k in range(len(drive)):
             states[k] = twin.read_states()
             self._memory.u[:] = given.inputs[k]
             self._update_black_box(given.measurements[k])
             parameters[k] = self._memory.p
             outputs[k] = self._memory.y
+            variance[k] = self._memory.laws[:, PP]
             trustworthy[k] = self.trustworthy
         return Estimate(
             time=drive.time,
@@ -271,8 +275,27 @@ class Observer:
             output_names=twin.outputs,
             extended_names=(),
             estimated=self._estimated,
+            sd=self._sd(variance),
             trustworthy=trustworthy,
         )
+
+    def _sd(self, variance: Array) -> Array | None:
+        """(N, p) standard deviations of what is estimated; NaN where its law knows none.
+
+        Args:
+            variance: (N, n) of each law's parameter, as the law has it.
+
+        Returns:
+            None if no law is of the least-squares form.
+        """
+        if not (self._laws["form"] == LEAST_SQUARES).any():
+            return None
+        sd = np.full((len(variance), len(self._estimated)), np.nan)
+        for law, values in zip(self._laws, variance.T, strict=True):
+            if law["form"] == LEAST_SQUARES:
+                name = self.twin.parameters[law["parameter"]]
+                sd[:, self._estimated.index(name)] = np.sqrt(values)
+        return sd
 
     def _update_black_box(self, y: Array) -> None:
         """`_update`, its simulator called from Python."""
@@ -361,7 +384,7 @@ def _plausible(memory, ax):
 @njit(cache=True, nogil=True)
 def _run(
     car, gains, laws, memory, every, follower, given, states, parameters, outputs, extended,
-    trustworthy,
+    variance, trustworthy,
 ):  # fmt: skip
     """All samples of a drive; returns how many were sound."""
     n = given.inputs.shape[0]
@@ -375,6 +398,8 @@ def _run(
         _copy(memory.p, parameters[k])
         _copy(memory.y, outputs[k])
         extended[k] = car.tyre_output
+        for law in range(laws.size):
+            variance[k, law] = memory.laws[law, PP]
         if memory.watch.shape[0]:
             trustworthy[k] = memory.unsettled[0] <= 0.0
         if not is_sound(car):
@@ -408,6 +433,7 @@ ENTRIES = (
         make=_make,
         needs=frozenset(("twin",)),
         gives=(*PARAMETERS, "sideslip"),
+        sd=True,
         online=True,
     ),
     Entry(
@@ -416,6 +442,7 @@ ENTRIES = (
         make=_make,
         needs=frozenset(("twin", "laws")),
         gives=(*PARAMETERS, "sideslip"),
+        sd=True,
         online=True,
     ),
     Entry(

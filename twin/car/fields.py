@@ -123,6 +123,10 @@ SECTIONS = (
             Field("drive_front", "1", 0.4, 0.0, 1.0, "share of the drive torque"),
             Field("brake_front", "1", 0.65, 0.0, 1.0, "share of the brake torque"),
             Field("power", "W", 250_000.0, 1e3, 1e7, "of the engine at the wheels"),
+            Field(
+                *("torque_accuracy", "1", 0.03, 0.0, 0.5),
+                "standard deviation of the scale of a log's torques; widens the mass's interval",
+            ),
         ),
     ),
     Section(

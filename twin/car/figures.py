@@ -16,6 +16,8 @@ OPTIONAL = {
     "drive_front": (0.0, 0.0, 1.0),  # share of the front axle in the drive torque; rear drive
     "brake_front": (0.65, 0.0, 1.0),  # ... in the brake torque
     "power": (0.0, 0.0, 1e7),  # of the engine at the wheels [W]; 0: as usual for the mass
+    # standard deviation of the scale of the torques that a log has
+    "torque_accuracy": (0.03, 0.0, 0.5),
 }
 USUAL_POWER = 80.0  # [W/kg]; chosen: a car of 110 horsepower a tonne
 _SPEED = 20.0  # [m/s] at which grip is looked for
@@ -41,6 +43,7 @@ class Figures(NamedTuple):
     drive_front: float  # share of the front axle in the drive torque
     brake_front: float  # ... in the brake torque
     power: float  # of the engine at the wheels [W]
+    torque_accuracy: float  # standard deviation of the scale of a log's torques
 
 
 class Grip(NamedTuple):
@@ -83,6 +86,7 @@ def figures_of(model: mujoco.MjModel, tyres: NDArray[np.void]) -> Figures:
         drive_front=number(model, "drive_front"),
         brake_front=number(model, "brake_front"),
         power=number(model, "power") or USUAL_POWER * mass,
+        torque_accuracy=number(model, "torque_accuracy"),
     )
 
 

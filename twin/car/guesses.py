@@ -19,6 +19,7 @@ RELATIVE = {
     **{"mass": 0.10, "Jxx": 0.15, "Jyy": 0.12, "Jzz": 0.10, "ratio": 0.10, "drag_area": 0.15},
     **{"stiffness": 0.25, "damping": 0.35, "anti_roll": 0.5, "bump_stop": 0.5},
     **{"hub_mass": 0.25, "wheel_mass": 0.15, "wheel_inertia": 0.25, "power": 0.3},
+    "torque_accuracy": 1.0,
 }
 
 
