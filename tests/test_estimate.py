@@ -79,9 +79,12 @@ def write_csv(path, drive):
     return path
 
 
-def rows_of(path):
-    rows = json.loads(path.read_text())["rows"]
-    return {(row["quantity"], row["metric"]): row["median"] for row in rows}
+def answer_of(path):
+    return json.loads(path.read_text())["answer"]
+
+
+def mass_of(answer):
+    return answer["quantities"][0]
 
 
 def test_drive_gives_timeline_history_and_scored_result(saved, drive):
@@ -89,19 +92,23 @@ def test_drive_gives_timeline_history_and_scored_result(saved, drive):
     assert status == 0
     names = {path.name for path in (folder / "out").iterdir()}
     assert names == {f"drive.til.{ending}" for ending in ("json", "rrd", "parquet")}
-    rows = rows_of(folder / "out" / "drive.til.json")
-    assert {("mass", "final"), ("mass", "sd"), ("mass", "error"), ("mass", "rms_pct")} < set(rows)
-    assert {("sideslip", "final"), ("sideslip", "rmse"), ("vx", "rmse")} < set(rows)
-    assert rows["mass", "error"] == pytest.approx(rows["mass", "final"] - 355.0)
-    assert rows["mass", "rms_pct"] < 30.0
-    assert rows["vx", "rmse"] < 0.05
-    assert 50.0 < rows["all", "trustworthy"] < 100.0
+    answer = answer_of(folder / "out" / "drive.til.json")
+    mass, errors = mass_of(answer), answer["errors"]
+    assert (mass["name"], mass["unit"]) == ("mass", "kg")
+    assert mass["value"] == pytest.approx(2337.83 + mass["change"], abs=0.1)
+    assert mass["low"] == pytest.approx(mass["change"] - 1.96 * mass["sd"])
+    assert set(errors) == {"mass_kg", "mass_pct", "sideslip_deg", "vx_m_s"}
+    assert errors["mass_kg"] == pytest.approx(mass["change"] - 355.0)
+    assert errors["mass_pct"] < 30.0
+    assert errors["vx_m_s"] < 0.05
+    assert 0.5 < answer["trusted"] < 1.0
+    assert answer["untrusted"][0]["reason"] == "the estimate settles after the start"
 
     import pyarrow.parquet as pq
 
     history = pq.read_table(folder / "out" / "drive.til.parquet")
     assert history.num_rows == len(drive)
-    assert history["mass"][-1].as_py() == rows["mass", "final"]
+    assert history["mass"][-1].as_py() == mass["change"]
 
 
 def test_second_call_keeps_what_is_finished_and_a_bad_log_does_not_stop_the_others(
@@ -118,8 +125,9 @@ def test_second_call_keeps_what_is_finished_and_a_bad_log_does_not_stop_the_othe
     assert status == 2
     assert (folder / "out" / "drive.til.json").stat().st_mtime_ns == before
     result = json.loads(out)
-    assert {row["case"] for row in result["rows"]} == {"drive"}
-    assert [log["kept"] for log in result["settings"]["logs"]] == [False, False, True]
+    assert [log["kept"] for log in result["logs"]] == [False, False, True]
+    assert [log["answer"] is None for log in result["logs"]] == [True, True, False]
+    assert not {"rows", "median", "p90", "paper"} & set(result)
     lines = err.splitlines()
     assert len(lines) == 2
     assert f"til: {folder / 'cut.parquet'}: cannot be read as Parquet" in lines[0]
@@ -139,9 +147,8 @@ def test_another_car_is_another_result(saved):
         (folder / "out2" / name).write_bytes((folder / "out" / name).read_bytes())
     outcome = observe(task)
     assert (outcome.kept, outcome.error) == (False, "")
-    loaded = {(row.quantity, row.metric): row.median for row in outcome.rows}
-    empty = rows_of(folder / "out" / "drive.til.json")
-    assert loaded["mass", "final"] < empty["mass", "final"] - 200.0
+    empty = mass_of(answer_of(folder / "out" / "drive.til.json"))
+    assert outcome.answer.quantities[0].change < empty["change"] - 200.0
 
 
 def test_csv_in_everyday_units_and_sae_axes_gives_the_same_estimates(saved, drive):
@@ -155,12 +162,12 @@ def test_csv_in_everyday_units_and_sae_axes_gives_the_same_estimates(saved, driv
     outcome = observe(task)
     assert outcome.error == ""
     assert "ay: from 'Ay' in g at 1000 Hz, sign turned." in outcome.done
-    expected = rows_of(folder / "out" / "drive.til.json")
-    found = {(row.quantity, row.metric): row.median for row in outcome.rows}
-    assert set(expected) - set(found) == {
-        ("mass", "error"), ("mass", "rms_pct"), ("sideslip", "rmse"), ("vx", "rmse")
-    }  # fmt: skip
-    for key in (("mass", "final"), ("mass", "sd"), ("vx", "final"), ("all", "trustworthy")):
+    expected = answer_of(folder / "out" / "drive.til.json")
+    found = outcome.answer.to_json()
+    assert (found["errors"], set(expected["errors"])) == ({}, {*expected["errors"]})
+    for key in ("change", "sd"):
+        assert mass_of(found)[key] == pytest.approx(mass_of(expected)[key], rel=1e-5)
+    for key in ("speed", "trusted"):
         assert found[key] == pytest.approx(expected[key], rel=1e-5, abs=1e-5)
 
 
@@ -179,11 +186,11 @@ def test_log_without_torques_gives_sideslip_but_no_mass_and_says_so(tmp_path, dr
     )  # fmt: skip
     outcome = observe(task)
     assert outcome.error == ""
-    found = {(row.quantity, row.metric): row.median for row in outcome.rows}
-    assert ("mass", "final") not in found
-    assert found["sideslip", "rmse"] < 0.05
-    assert found["sideslip", "rmse"] < 2.0 * found["sideslip", "sd"] < 4.0
-    assert found["vx", "rmse"] < 0.1
+    answer = outcome.answer
+    assert answer.quantities == ()
+    assert answer.errors["sideslip_deg"] < 0.05
+    assert answer.errors["sideslip_deg"] < answer.sideslip.band < 4.0
+    assert answer.errors["vx_m_s"] < 0.1
     history = pq.read_table(tmp_path / "bare.til.parquet")
     assert (history["sideslip_sd"].to_numpy() > 0.0).mean() > 0.99
     assert any(line.startswith("mass cannot be estimated without drive_t") for line in outcome.done)

@@ -41,23 +41,24 @@ def estimated(log, capsys, factor=1.0, changes=""):
     args = ["estimate", str(log), "--map", str(path), "--vehicle", "suv", "--out", str(out)]
     assert cli.main([*args, "--json", "-"]) == 0
     result = json.loads(capsys.readouterr().out)
-    rows = {(row["quantity"], row["metric"]): row["median"] for row in result["rows"]}
-    return result["settings"]["logs"][0], rows, pq.read_table(out / "log.til.parquet")
+    told = result["logs"][0]
+    return told, told["answer"], pq.read_table(out / "log.til.parquet")
 
 
 def test_right_map_is_trustworthy(log, capsys):
-    told, rows, _ = estimated(log, capsys)
+    told, answer, _ = estimated(log, capsys)
     assert told["trustworthy"] is True
     assert told["faults"] == []
-    assert abs(rows["mass", "final"] - 355.0) < 1.96 * rows["mass", "sd"]
+    mass = answer["quantities"][0]
+    assert mass["low"] < 355.0 < mass["high"]
 
 
 def test_estimate_on_its_bound_is_not_trustworthy_and_says_so(log, capsys):
-    told, rows, history = estimated(log, capsys, factor=2.5)
+    told, answer, history = estimated(log, capsys, factor=2.5)
     assert told["trustworthy"] is False
-    assert rows["mass", "final"] == pytest.approx(0.6 * 2337.8, rel=1e-4)
+    assert answer["quantities"][0]["change"] == pytest.approx(0.6 * 2337.8, rel=1e-4)
     assert "mass rests on the bound of its estimate, 1402.68 kg." in told["faults"]
-    assert rows["all", "trustworthy"] == 0.0
+    assert answer["trusted"] == 0.0
     assert not np.asarray(history["trustworthy"]).any()
 
 

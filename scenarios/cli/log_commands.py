@@ -6,6 +6,7 @@ import click
 
 from scenarios.cli import catalogue
 from scenarios.cli.options import (
+    STANDARD_OUTPUT,
     Mistake,
     Names,
     OutputFile,
@@ -14,7 +15,7 @@ from scenarios.cli.options import (
     jobs_option,
     json_option,
 )
-from scenarios.cli.output import report
+from scenarios.cli.output import report, save
 
 
 @click.command()
@@ -178,7 +179,9 @@ def estimate(
             [Path(log) for log in logs],
             vehicle=vehicle, map_path=map_path, estimators=estimators, jobs=jobs, out=out,
         )  # fmt: skip
-    report(result, json_path, f"{text}\n\n{result.table()}" if result.rows else text)
+    if json_path != STANDARD_OUTPUT:
+        click.echo(text)
+    save(result, json_path)
     for line in bad:
         click.echo(f"til: {line}", err=True)
     return 2 if bad else 0

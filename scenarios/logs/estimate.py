@@ -6,7 +6,6 @@ map, the vehicle and the estimator. A batch that was interrupted goes on where i
 
 import hashlib
 import json
-import math
 import os
 import time
 from collections.abc import Sequence
@@ -17,14 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.score import rms_pct
 from scenarios.experiment.progress import parallel
-from scenarios.experiment.result import Result, Row, json_text, replacing, versions
-from scenarios.logs.candidate import SLOWEST
-from scenarios.logs.estimators import ESTIMATORS, Found, unit_of
+from scenarios.experiment.result import Result, json_text, replacing, versions
+from scenarios.logs.answer import Answer, answer, sideslip
+from scenarios.logs.answer_text import lines_of
+from scenarios.logs.estimators import ESTIMATORS, Found
 from scenarios.logs.findings import Finding, findings, hills
+from scenarios.logs.mass_interval import with_hills, with_torque_accuracy
 from scenarios.logs.pieces import lacking, measured, prepared
-from twin import PARAMETERS, Drive, TwinError, Vehicle
+from twin import Drive, TwinError, Vehicle
 from twin.car.fingerprint import fingerprint
 from twin.car.signals import signals_of
 from twin.logs.mapped_log import NEEDS
@@ -33,10 +33,6 @@ from twin.toml_file import reason
 
 Array = NDArray[np.float64]
 
-_LEAST_HILL = 0.1  # [m/s2]; what is less is noise and pitching
-# Of the mass, for each m/s2 of hills: twice of what 12 drives of the SUV were off in sines of 1 to
-# 6 % and 25 to 60 s
-_HILLS = 0.07
 _KEPT = ("mass", "vx", "vy", "yaw_rate", "roll", "pitch")  # what else the history holds
 
 
@@ -72,7 +68,7 @@ class Outcome:
     Attributes:
         log: as it was given.
         fingerprint: see `fingerprint_of`.
-        rows: figures.
+        answer: what is known after it; None if it failed.
         done: sentences: what was done with the log, and what cannot be estimated.
         trustworthy: whether the estimates are at the end; None where nobody looked.
         faults: sentences, each of which makes the estimates not trustworthy.
@@ -82,7 +78,7 @@ class Outcome:
 
     log: str
     fingerprint: str = ""
-    rows: tuple[Row, ...] = ()
+    answer: Answer | None = None
     done: tuple[str, ...] = ()
     trustworthy: bool | None = None
     faults: tuple[str, ...] = ()
@@ -98,8 +94,8 @@ def run(
     estimators: Sequence[str],
     jobs: int,
     out: Path,
-) -> tuple[Result, str, list[str]]:
-    """Observes logs; returns the result, what was done as text, and a line for each bad log.
+) -> tuple[dict[str, Any], str, list[str]]:
+    """Observes logs; returns the result as JSON, the same as text, and a line for each bad log.
 
     Raises:
         TwinError: the vehicle's files are missing or broken, or the folder cannot be written.
@@ -118,14 +114,14 @@ def run(
     outcomes = parallel(observe, tasks, jobs, "estimate")
     result = Result(
         name="estimate",
-        settings={
-            "vehicle": vehicle,
-            "map": map_path,
-            "logs": [_told(task, outcome) for task, outcome in zip(tasks, outcomes, strict=True)],
-        },
+        settings={"vehicle": vehicle, "map": map_path},
         seconds=time.perf_counter() - start,
-        rows=[row for outcome in outcomes for row in outcome.rows],
-    )
+        rows=(),
+    ).to_json()
+    del result["rows"]
+    result["logs"] = [
+        _finite(_told(task, outcome)) for task, outcome in zip(tasks, outcomes, strict=True)
+    ]
     text = "\n".join(_as_text(task, one) for task, one in zip(tasks, outcomes, strict=True))
     return result, text, [one.error for one in outcomes if one.error]
 
@@ -142,14 +138,14 @@ def observe(task: Task) -> Outcome:
         outcome = Outcome(
             log=str(task.log),
             fingerprint=mark,
-            rows=tuple(_rows(task, found)),
+            answer=answer(found, Vehicle.load(task.vehicle)),
             done=(*done, *found.done),
             trustworthy=_at_end(found),
             faults=found.faults,
         )
         _write_timeline(task, found)
         _write_history(task, found)
-        content = asdict(outcome) | {"rows": [asdict(row) for row in outcome.rows]}
+        content = _told(task, outcome)
         with replacing(task.file(".json")) as partial:
             partial.write_text(json_text(_finite(content)) + "\n", encoding="utf-8")
         return outcome
@@ -194,21 +190,9 @@ def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
         )
     longest = max(log.pieces, key=len)
     wrong = findings(longest, vehicle)
-    found = _with_hills(ESTIMATORS[task.estimator](vehicle, log), hills(longest, vehicle))
+    found = with_hills(ESTIMATORS[task.estimator](vehicle, log), hills(longest, vehicle))
+    found = with_torque_accuracy(found, vehicle)
     return _with_findings(found, wrong), (*told, *log.done)
-
-
-def _with_hills(found: Found, hill: float) -> Found:
-    """The mass' standard deviation with what a twin on a flat road gets wrong in hills [m/s2]."""
-    if "mass" not in found.sd or hill < _LEAST_HILL:
-        return found
-    more = _HILLS * hill * float(found.estimate.absolute("mass")[-1])
-    sd = found.sd | {"mass": math.hypot(found.sd["mass"], more)}
-    note = (
-        f"Hills of {hill:.2g} m/s2, which the twin does not drive: the mass' standard deviation "
-        f"contains {more:.3g} kg for them."
-    )
-    return found._replace(sd=sd, done=(*found.done, note))
 
 
 def _with_findings(found: Found, wrong: Sequence[Finding]) -> Found:
@@ -221,77 +205,6 @@ def _with_findings(found: Found, wrong: Sequence[Finding]) -> Found:
         estimate = replace(estimate, trustworthy=nowhere)
     return found._replace(
         estimate=estimate, done=(*found.done, *notes), faults=(*faults, *found.faults)
-    )
-
-
-def _rows(task: Task, found: Found) -> list[Row]:
-    """Final estimates, their standard deviations, and scores where there is truth."""
-    rows: list[Row] = []
-
-    def add(quantity: str, metric: str, unit: str, value: float) -> None:
-        rows.append(
-            Row.over_seeds(
-                [value], case=task.name, quantity=quantity, metric=metric, unit=unit,
-                estimator=task.estimator,
-            )
-        )  # fmt: skip
-
-    drive, estimate = found.drive, found.estimate
-    for name in found.parameters:
-        add(name, "final", unit_of(name), float(estimate[name][-1]))
-        if name in found.sd:
-            add(name, "sd", unit_of(name), found.sd[name])
-        truth = float(drive.truth.get(name, np.array([np.nan]))[-1])
-        delta = truth - float(estimate.nominal[PARAMETERS.index(name)])
-        if np.isfinite(delta):
-            add(name, "error", unit_of(name), float(estimate[name][-1]) - delta)
-            if abs(delta) > 1e-9:
-                step = float(np.median(np.diff(drive.time)))
-                add(name, "rms_pct", "%", rms_pct(estimate[name], delta, step))
-    if not lacking("sideslip", measured([drive])):
-        slip = np.degrees(sideslip(found))
-        add("sideslip", "final", "deg", float(slip[-1]))
-        add("sideslip", "largest", "deg", float(np.abs(slip).max()))
-        if estimate.sideslip_sd is not None:
-            add(
-                "sideslip",
-                "sd",
-                "deg",
-                float(np.degrees(np.sqrt(np.mean(estimate.sideslip_sd**2)))),
-            )
-        if "sideslip" in drive.truth:
-            add("sideslip", "rmse", "deg", _rmse(slip, np.degrees(drive.truth["sideslip"]), found))
-    add("vx", "final", "m/s", float(estimate["vx"][-1]))
-    if "vx" in drive.truth:
-        add("vx", "rmse", "m/s", _rmse(estimate["vx"], drive.truth["vx"], found))
-    if estimate.trustworthy is not None:
-        add("all", "trustworthy", "%", 100.0 * float(estimate.trustworthy.mean()))
-    return rows
-
-
-def sideslip(found: Found) -> Array:
-    """(N,) of the twin's IMU, or of the point where a calibration measured it [rad]."""
-    estimate = found.estimate
-    if "sideslip" in estimate.output_names:
-        return estimate["sideslip"]
-    return np.arctan2(estimate["vy"], np.maximum(estimate["vx"], SLOWEST))
-
-
-def _rmse(estimate: Array, truth: Array, found: Found) -> float:
-    """Where the car moves and the truth is known."""
-    good = np.isfinite(truth) & (found.estimate["vx"] > SLOWEST)
-    return float(np.sqrt(np.mean((estimate - truth)[good] ** 2))) if good.any() else float("nan")
-
-
-def _band(found: Found) -> float:
-    """Standard deviation of the sideslip where the car moves, rms [deg]."""
-    estimate = found.estimate
-    assert estimate.sideslip_sd is not None
-    moves = estimate["vx"] > SLOWEST
-    return (
-        float(np.degrees(np.sqrt(np.mean(estimate.sideslip_sd[moves] ** 2))))
-        if moves.any()
-        else math.nan
     )
 
 
@@ -339,9 +252,10 @@ def _read(task: Task, mark: str) -> Outcome | None:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["fingerprint"] != mark:
             return None
-        rows = tuple(Row(**_numbers(row)) for row in content.pop("rows"))
-        content |= {"rows": rows, "done": tuple(content["done"]), "kept": True}
-        content["faults"] = tuple(content["faults"])
+        for name in ("name", "estimator"):
+            content.pop(name)
+        content |= {"answer": Answer.from_json(content["answer"]), "kept": True}
+        content |= {name: tuple(content[name]) for name in ("done", "faults")}
         return Outcome(**content)
     except (ValueError, TypeError, KeyError):
         return None
@@ -354,11 +268,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def _numbers(row: dict[str, Any]) -> dict[str, Any]:
-    """A row as JSON keeps it, with NaN again for a figure that was none."""
-    return row | {key: np.nan for key in ("median", "p90") if row[key] is None}
 
 
 def _names(logs: Sequence[Path]) -> list[str]:
@@ -378,12 +287,12 @@ def _names(logs: Sequence[Path]) -> list[str]:
 
 
 def _told(task: Task, outcome: Outcome) -> dict[str, Any]:
-    told = {key: value for key, value in asdict(outcome).items() if key != "rows"}
-    return told | {"name": task.name, "estimator": task.estimator}
+    """A log's result as JSON keeps it."""
+    return {"name": task.name, "estimator": task.estimator} | asdict(outcome)
 
 
 def _as_text(task: Task, outcome: Outcome) -> str:
-    """What was done with a log, line by line."""
+    """What is known after a log and what was done with it, line by line."""
     if outcome.error:
         return f"{task.log}: failed"
     kept = f"kept from before, in {task.file('.json')}" if outcome.kept else ""
@@ -391,5 +300,6 @@ def _as_text(task: Task, outcome: Outcome) -> str:
            False: "AT THE END THE ESTIMATES ARE NOT TRUSTWORTHY"}[outcome.trustworthy]  # fmt: skip
     notes = ", ".join(part for part in (end, kept) if part)
     title = f"{task.log}, {task.estimator}" + (f": {notes}" if notes else "")
-    lines = [*outcome.done, *(f"NOT TRUSTWORTHY: {fault}" for fault in outcome.faults)]
+    known = [] if outcome.answer is None else lines_of(outcome.answer)
+    lines = [*known, *outcome.done, *(f"NOT TRUSTWORTHY: {fault}" for fault in outcome.faults)]
     return "\n".join([title, *(f"  {line}" for line in lines)])

@@ -1,0 +1,63 @@
+"""What the mass' standard deviation contains besides the noise: torques, and hills."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from scenarios.logs.estimators import Found
+from twin import Vehicle
+
+_LEAST_HILL = 0.1  # [m/s2]; what is less is noise and pitching
+# Of the mass, for each m/s2 of hills: twice of what 12 drives of the SUV were off in sines of 1 to
+# 6 % and 25 to 60 s
+_HILLS = 0.07
+
+
+def with_hills(found: Found, hill: float) -> Found:
+    """With what a twin on a flat road gets wrong in hills.
+
+    Args:
+        found: of an estimator that knows nothing of hills.
+        hill: standard deviation of what gravity adds to a_x [m/s2].
+    """
+    if "mass" not in found.sd or hill < _LEAST_HILL:
+        return found
+    more = _HILLS * hill * float(found.estimate.absolute("mass")[-1])
+    return _widened(
+        found,
+        more,
+        f"Hills of {hill:.2g} m/s2, which the twin does not drive: the mass' standard deviation "
+        f"contains {more:.3g} kg for them.",
+    )
+
+
+def with_torque_accuracy(found: Found, vehicle: Vehicle) -> Found:
+    """With what the scale of the log's torques may be off by: the mass is off by as much.
+
+    An observer that estimates that scale along has it in its standard deviation already.
+    """
+    accuracy = vehicle.figures.torque_accuracy
+    if "mass" not in found.sd or "drive_torque" in found.parameters or accuracy == 0.0:
+        return found
+    more = accuracy * (vehicle.figures.mass + float(found.estimate["mass"][-1]))
+    return _widened(
+        found,
+        more,
+        f"The torques are taken to be accurate to {100.0 * accuracy:.3g} % (torque_accuracy of the "
+        f"car's file): the mass' standard deviation contains {more:.3g} kg for them.",
+    )
+
+
+def _widened(found: Found, more: float, note: str) -> Found:
+    """With an independent error of the mass [kg], at the end and over time."""
+    estimate = found.estimate
+    if estimate.sd is not None and "mass" in estimate.estimated:
+        sd = estimate.sd.copy()
+        column = estimate.estimated.index("mass")
+        sd[:, column] = np.hypot(sd[:, column], more)
+        estimate = replace(estimate, sd=sd)
+    return found._replace(
+        estimate=estimate,
+        sd=found.sd | {"mass": float(np.hypot(found.sd["mass"], more))},
+        done=(*found.done, note),
+    )
