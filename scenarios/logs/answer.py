@@ -123,7 +123,9 @@ class Answer:
         lists = {
             "quantities": tuple(Quantity(**one) for one in content["quantities"]),
             "sideslip": None if slip is None else Sideslip(**slip),
-            "untrusted": tuple(Span(**one) for one in content["untrusted"]),
+            "untrusted": tuple(
+                Span(**one | {"channels": tuple(one["channels"])}) for one in content["untrusted"]
+            ),
             "unknown": tuple(content["unknown"]),
         }
         return cls(**content | lists)
