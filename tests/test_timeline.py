@@ -381,3 +381,27 @@ def test_stages_of_a_staged_observer_are_drawn(tmp_path, vehicle):
     path = write(tmp_path / "with.rrd", vehicle, estimate=staged)
     assert "/stage/stage" in {entity for entity, *_ in chunks(path)}
     assert "/stage/stage" not in {entity for entity, *_ in chunks(without)}
+
+
+def test_sideslip_of_a_log_has_its_band_truth_error_and_trust(tmp_path, vehicle):
+    slip, sd = np.linspace(-0.1, 0.1, SAMPLES), np.full(SAMPLES, 0.01)
+    trusted = np.arange(SAMPLES) < SAMPLES // 2
+    estimate = make_estimate(
+        outputs=np.column_stack([make_estimate().outputs, slip]),
+        output_names=(*twin.OUTPUTS, "sideslip"),
+        sideslip_sd=sd,
+        trustworthy=trusted,
+        trust_reason=np.where(trusted, 0, 1).astype(np.uint8),
+        reasons=("", "the yaw rate does not agree"),
+    )
+    drive = make_drive(truth={"sideslip": slip + 0.005}, settings={"log": "drive.csv"})
+    path = write(tmp_path / "log.rrd", vehicle, estimate=estimate, drive=drive, parameters=[])
+    values = {
+        name: column(path, f"/{name}", "Scalars:scalars").ravel()
+        for name in ("sideslip/upper", "sideslip/lower", "sideslip/truth", "sideslip_error/error")
+    }
+    band = values["sideslip/upper"] - values["sideslip/lower"]
+    np.testing.assert_allclose(band, np.degrees(0.04), rtol=1e-6)
+    np.testing.assert_allclose(values["sideslip_error/error"], -np.degrees(0.005), rtol=1e-6)
+    states = [row[0] for row in temporal(path)["/trust"]["StateChange:state"]]
+    assert states == ["trustworthy", "the yaw rate does not agree"]

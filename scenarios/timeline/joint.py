@@ -15,6 +15,7 @@ from estimators.joint.sensor_errors import SENSOR_ERROR
 from scenarios.timeline import scene as timeline_3d
 from scenarios.timeline import timeline as tl
 from scenarios.timeline.inertia import log_inertia
+from scenarios.timeline.plots import PLOT_RATE
 from scenarios.timeline.states import Colour, Lane, lanes_view, send_lane
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def _send_plot(
     import rerun as rr
 
     i = estimate.estimated.index(name)
-    samples = tl.thinned(time, tl.PLOT_RATE)
+    samples = tl.thinned(time, PLOT_RATE)
     values, sd = _values(i, estimate)[samples], estimate.sd[samples, i]
     banded = values[:, None] + SIGMAS * np.outer(sd, (1.0, -1.0, 0.0))
     found = np.diff(estimate.changes[samples], prepend=0) > 0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.timeline import timeline as tl
+from scenarios.timeline.plots import PLOT_RATE, everything, thinned
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -32,7 +32,7 @@ def send_lane(recording: rr.RecordingStream, time: NDArray[np.float64], lane: La
     names = list(lane.colours)
     style = rr.StateConfiguration(values=names, colors=list(lane.colours.values()))
     recording.log(lane.entity, style, static=True)
-    samples = tl.thinned(time, tl.PLOT_RATE)
+    samples = thinned(time, PLOT_RATE)
     shown = lane.states[samples]
     new = np.flatnonzero(np.diff(shown, prepend=-1))
     index = [rr.TimeColumn("time", duration=time[samples[new]])]
@@ -48,5 +48,5 @@ def lanes_view(title: str, entities: Sequence[str]) -> rrb.StateTimelineView:
         origin="/",
         contents=[f"+ /{entity}" for entity in entities],
         name=title,
-        time_view=rrb.TimeAxis(view_range=tl.everything()),
+        time_view=rrb.TimeAxis(view_range=everything()),
     )

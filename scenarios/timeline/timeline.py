@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,19 @@ import twin
 from estimators.base import Estimate
 from estimators.ensemble.staged import Stage, StagedEstimate
 from scenarios.timeline import scene as timeline_3d
+from scenarios.timeline.plots import (
+    BAND_COLOUR,
+    MEASURED,
+    TRUTH,
+    TWIN,
+    Line,
+    Plot,
+    plot_view,
+    send_plot,
+    thinned,
+)
+from scenarios.timeline.sideslip import sideslip_plots, trust_lane
+from scenarios.timeline.states import Lane, lanes_view, send_lane
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -27,13 +40,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 APPLICATION = "twin-in-the-loop"
-PLOT_RATE = 100.0  # [Hz] at most
 FRAME_RATE = 30.0  # [Hz] at most
 BAND = 0.1  # of the variation, TiL Section 4
 
-# Where curves coincide the truth, drawn last, is a thin line within the twin's broad one.
-# Colours: the twin and what it estimates, the truth, its band, the noisy measurement
-TWIN, TRUTH, BAND_COLOUR, MEASURED = (235, 120, 50), (70, 190, 130), (60, 105, 85), (125, 130, 140)
 # The measurement whose residual tells most of a parameter: TiL Eqs. (14), (15), (18)
 _SIGNAL = {
     **{"mass": "ax", "cm_x": "yaw_rate", "cm_y": "roll_rate", "cm_z": "roll_rate"},
@@ -44,24 +53,6 @@ _SIGNAL = {
     **{"drive_torque": "ax", "brake_torque": "ax"},
     **dict.fromkeys(twin.FORCES, "ay"),
 }
-
-
-class Line(NamedTuple):
-    """A series of a plot: (N,) values and how they are drawn."""
-
-    entity: str
-    name: str
-    values: Array
-    colour: tuple[int, int, int]
-    width: float
-
-
-class Plot(NamedTuple):
-    """Series that belong in one view, under one entity."""
-
-    entity: str
-    title: str
-    lines: list[Line]
 
 
 def write_timeline(
@@ -92,16 +83,23 @@ def write_timeline(
     plots = [_parameter_plot(name, drive, estimate) for name in parameters]
     signals = dict.fromkeys([_SIGNAL[name] for name in parameters] or ["ax"])
     others = [*(_signal_plot(name, drive, estimate) for name in signals), _speed(drive, estimate)]
+    plots += sideslip_plots(drive, estimate)
+    trust = trust_lane(estimate)
     if isinstance(estimate, StagedEstimate):
         plots.append(_stage(estimate))
     moved = timeline_3d.motion(drive, estimate, frames(drive.time))
-    scene = timeline_3d.scene("vehicle" if drive.truth else "twin", moved)
+    known = any(name in drive.truth for name in twin.STATES)
+    scene = timeline_3d.scene("vehicle" if known else "twin", moved)
     model = vehicle.compile()
 
-    with recording_to(path, _blueprint(plots, others, scene), title, drive.settings) as recording:
+    with recording_to(
+        path, _blueprint(plots, others, scene, trust), title, drive.settings
+    ) as recording:
         timeline_3d.log_car(recording, model, moved)
         for plot in (*plots, *others):
             send_plot(recording, drive.time, plot)
+        if trust:
+            send_lane(recording, drive.time, trust)
 
 
 @contextmanager
@@ -179,13 +177,6 @@ def frames(time: Array) -> NDArray[np.int64]:
     return thinned(time, FRAME_RATE)
 
 
-def thinned(time: Array, rate: float) -> NDArray[np.int64]:
-    """Indices of samples at no more than a rate [Hz], the first and the last among them."""
-    period = np.floor((time - time[0]) * rate + 1e-6)
-    first = np.flatnonzero(np.diff(period, prepend=-1.0) > 0.0)
-    return np.union1d(first, [time.size - 1])
-
-
 def _parameter_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
     lines = []
     if name in drive.truth:
@@ -231,20 +222,6 @@ def _stage(estimate: StagedEstimate) -> Plot:
     return Plot("stage", f"stage: {names}", [line])
 
 
-def send_plot(recording: rr.RecordingStream, time: Array, plot: Plot) -> None:
-    """Logs the series of a plot over time (N,) [s]."""
-    import rerun as rr
-
-    samples = thinned(time, PLOT_RATE)
-    index = [rr.TimeColumn("time", duration=time[samples])]
-    for line in plot.lines:
-        entity = f"{plot.entity}/{line.entity}"
-        style = rr.SeriesLines(names=line.name, colors=line.colour, widths=line.width)
-        recording.log(entity, style, static=True)
-        columns = rr.Scalars.columns(scalars=line.values[samples])
-        recording.send_columns(entity, index, columns)
-
-
 def _send_settings(recording: rr.RecordingStream, settings: Mapping[str, Any]) -> None:
     """Numbers and words as they are, lists and tables as JSON; versions under their own name."""
     import rerun as rr
@@ -261,7 +238,7 @@ def _send_settings(recording: rr.RecordingStream, settings: Mapping[str, Any]) -
 
 
 def _blueprint(
-    plots: Sequence[Plot], others: Sequence[Plot], scene: rrb.Spatial3DView
+    plots: Sequence[Plot], others: Sequence[Plot], scene: rrb.Spatial3DView, trust: Lane | None
 ) -> rrb.Blueprint:
     import rerun.blueprint as rrb
 
@@ -270,47 +247,15 @@ def _blueprint(
     # Where plots are many, one legend of each kind leaves room for the curves.
     explained = {plot.entity for plot in (small if columns == 1 else [*plots[:1], *others[:1]])}
     views = [plot_view(plot, legend=plot.entity in explained) for plot in small]
+    below = [plot_view(others[-1], legend=True)]
+    lanes = [lanes_view("trustworthy, or why not", [trust.entity])] if trust else []
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(scene, plot_view(others[-1], legend=True), row_shares=[3, 1]),
+            rrb.Vertical(scene, *below, *lanes, row_shares=[3, 1, 0.6][: 2 + len(lanes)]),
             rrb.Grid(*views, grid_columns=columns),
             column_shares=[3, 2] if columns == 1 else [1, 1],
         ),
         rrb.TimePanel(state="collapsed", timeline="time"),
         collapse_panels=True,
         auto_views=False,
-    )
-
-
-def everything() -> rr.TimeRange:
-    """All of time, for an axis."""
-    import rerun as rr
-
-    return rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
-
-
-def plot_view(
-    plot: Plot,
-    *,
-    legend: bool,
-    left: bool = False,
-    limits: tuple[float, float] | None = None,
-) -> rrb.TimeSeriesView:
-    """The view of a plot, over all of time.
-
-    Args:
-        plot: what it shows.
-        legend: whether it explains the series, in a corner below.
-        left: which corner.
-        limits: of the vertical axis; by default all fits.
-    """
-    import rerun.blueprint as rrb
-
-    corner = rrb.Corner2D.LeftBottom if left else rrb.Corner2D.RightBottom
-    return rrb.TimeSeriesView(
-        origin=plot.entity,
-        name=plot.title,
-        axis_x=rrb.TimeAxis(view_range=everything()),
-        axis_y=rrb.ScalarAxis(range=limits) if limits else None,
-        plot_legend=rrb.PlotLegend(corner, visible=legend),
     )

@@ -35,10 +35,13 @@ def write(experiment: Experiment, path: Path, *, seed: int, **settings: Any) -> 
 def _parameters(trials: Sequence[Trial], path: Path) -> None:
     trial = trials[0]
     drive = trial.drive
+    if trial.run.case.measured:  # of a log's truth only what is drawn beside the estimate
+        known = {name: values for name, values in drive.truth.items() if name == "sideslip"}
+        drive = drive.replace(truth=known)
     write_timeline(
         path,
         vehicle=_vehicle(trial),
-        drive=drive.replace(truth={}) if trial.run.case.measured else drive,
+        drive=drive,
         estimate=trial.estimate,
         parameters=tuple(name for name in trial.estimate.estimated if name in PARAMETERS),
         title=trial.run.experiment.name,
