@@ -340,10 +340,17 @@ def test_two_minutes_at_1_khz_stay_below_15_mb(tmp_path, vehicle):
             for name in ("states", "parameters", "outputs")
         },
     )
+    parameters = twin.PARAMETERS[:20]  # as many as an estimator finds at a time
     path = write(
-        tmp_path / "run.rrd", vehicle, drive=drive, estimate=estimate, parameters=twin.PARAMETERS
+        tmp_path / "run.rrd", vehicle, drive=drive, estimate=estimate, parameters=parameters
     )
     assert path.stat().st_size < 15e6
+
+
+def test_every_parameter_can_be_drawn(tmp_path, vehicle):
+    path = write(tmp_path / "run.rrd", vehicle, parameters=twin.PARAMETERS)
+    drawn = {entity.split("/")[2] for entity in temporal(path) if entity.startswith("/parameters/")}
+    assert drawn == set(twin.PARAMETERS)
 
 
 def test_importing_the_timeline_leaves_rerun_alone():

@@ -18,7 +18,7 @@ from scenarios.logs.follower import driven
 from scenarios.logs.free_parameters import FREE
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
 from scenarios.planning.advice import missing, what_to_drive
-from twin import LOAD, OUTPUTS, SCALES, WHEELS, Drive, Twin, TwinError, Vehicle
+from twin import LOAD, OUTPUTS, PARAMETER, SCALES, WHEELS, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ ESTIMATORS: dict[str, Callable[[Vehicle, Prepared], Found]] = {"til": til, "join
 
 def unit_of(parameter: str) -> str:
     """Of a parameter of `twin.PARAMETERS`."""
-    return "1" if parameter in SCALES else {"m": "kg", "c": "m", "J": "kg m2"}[parameter[0]]
+    return PARAMETER[parameter].unit
 
 
 def _joined(estimates: Sequence[Estimate]) -> Estimate:

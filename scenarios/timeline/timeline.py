@@ -43,17 +43,6 @@ APPLICATION = "twin-in-the-loop"
 FRAME_RATE = 30.0  # [Hz] at most
 BAND = 0.1  # of the variation, TiL Section 4
 
-# The measurement whose residual tells most of a parameter: TiL Eqs. (14), (15), (18)
-_SIGNAL = {
-    **{"mass": "ax", "cm_x": "yaw_rate", "cm_y": "roll_rate", "cm_z": "roll_rate"},
-    **{"Jxx": "roll_rate", "Jyy": "pitch_rate", "Jzz": "yaw_rate"},
-    **{"Jxy": "pitch_rate", "Jxz": "yaw_rate", "Jyz": "pitch_rate"},
-    **{"tyre_friction": "ay", "cornering_stiffness": "ay", "drag": "ax"},
-    **{"spring": "roll_rate", "damper": "roll_rate", "relaxation": "yaw_rate"},
-    **{"drive_torque": "ax", "brake_torque": "ax"},
-    **dict.fromkeys(twin.FORCES, "ay"),
-}
-
 
 def write_timeline(
     path: str | Path,
@@ -81,7 +70,7 @@ def write_timeline(
     path = Path(path)
     _check(path, drive, estimate, parameters)
     plots = [_parameter_plot(name, drive, estimate) for name in parameters]
-    signals = dict.fromkeys([_SIGNAL[name] for name in parameters] or ["ax"])
+    signals = dict.fromkeys([twin.PARAMETER[name].signal for name in parameters] or ["ax"])
     others = [*(_signal_plot(name, drive, estimate) for name in signals), _speed(drive, estimate)]
     plots += sideslip_plots(drive, estimate)
     trust = trust_lane(estimate)
@@ -193,9 +182,7 @@ def _parameter_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
 
 def unit_of(parameter: str) -> str:
     """The unit of one of `twin.PARAMETERS`."""
-    if parameter in twin.SCALES:
-        return "1"
-    return {"m": "kg", "c": "m", "J": "kg m²", "a": "N"}[parameter[0]]
+    return twin.PARAMETER[parameter].unit.replace("m2", "m²")
 
 
 def _signal_plot(name: str, drive: twin.Drive, estimate: Estimate) -> Plot:
