@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from estimators.base import Estimate
 from estimators.joint.noise import noise_of_record
 from estimators.joint.observer import JointObserver, JointSettings
+from estimators.joint.real_car import REAL_CAR
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
 from scenarios.logs.candidate import Candidate
@@ -138,11 +139,11 @@ def joint(vehicle: Vehicle, log: Prepared) -> Found:
     noise = np.where(
         [name in names for name in OUTPUTS], noise_of_record(piece.measurements), np.nan
     )
-    observer = JointObserver(vehicle, noise, JointSettings(parameters=(*LOAD, *SCALES)))
+    observer = JointObserver(vehicle, noise, JointSettings(parameters=REAL_CAR))
     observer.reset(start_speed(piece, rolling_radius(Observer(Twin(vehicle), []))))
     plain = piece.replace(measurements=piece.measurements[:, : len(OUTPUTS)], output_names=OUTPUTS)
     estimate = observer.run(plain)
-    parameters = observer.settings.parameters
+    parameters = (*LOAD, *SCALES)
     sd = dict(zip(estimate.estimated, estimate.sd[-1].tolist(), strict=True))
     told = what_to_drive(missing(estimate))
     return Found(piece, estimate, parameters, {name: sd[name] for name in parameters}, told)

@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from estimators.base import Estimate
 from estimators.entry import Given
 from estimators.joint.noise import noise_of_record
+from estimators.joint.observer import JointSettings
+from estimators.joint.real_car import REAL_CAR
 from estimators.registry import make
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
@@ -99,7 +101,10 @@ class _AsInACar:
         """Args: name: of the estimator; car: of its twins; drive: to take the noise from."""
         vehicle = Vehicle.load(car)
         noise = dict(zip(OUTPUTS, noise_of_record(drive.measurements).tolist(), strict=True))
-        self._estimator = make(name, Given(vehicle=vehicle, noise_sd=noise, dt=drive.dt))
+        settings = JointSettings(parameters=REAL_CAR) if name == "joint" else None
+        self._estimator = make(
+            name, Given(vehicle=vehicle, noise_sd=noise, dt=drive.dt, settings=settings)
+        )
         self._radius = rolling_radius(Observer(Twin(vehicle), []))
 
     def reset(
