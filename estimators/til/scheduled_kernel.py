@@ -32,6 +32,7 @@ CONSISTENCY = 1.0  # [s], of the mean squared innovations; chosen
 # faster, and by how much at most: a twin with too little grip else slides more to get more force
 SURPRISED, MOST_SURPRISED = 2.0, 30.0
 LEAST_SHARE = 0.1  # of the forces' noise at g that is there straight ahead
+LARGEST_FORCE = 2.0  # [m/s2] over the car's mass, of an axle's force: what is more is no error
 LEAST_FORCE = 0.5  # [m/s2] over the car's mass: standard deviation of an axle's force, judging it
 # Lateral speed against the kinematics v_y' = a_y - v_x r, which no tyre has a part in: over
 # `KINEMATIC_TIME` gravity through roll and bank adds up to less than `LARGEST_GAP`. A twin that
@@ -357,7 +358,9 @@ def observe(car, fixed, memory, inputs, measurements, speeds, start, history):
             dx[YAW_RATE] += change[1]
             for i in range(2):
                 memory.parameters[FORCES[i]] *= decay
-                memory.parameters[FORCES[i]] += change[2 + i]
+                force = memory.parameters[FORCES[i]] + change[2 + i]
+                most = LARGEST_FORCE * fixed.mass
+                memory.parameters[FORCES[i]] = min(max(force, -most), most)
                 memory.offsets[i] += change[4 + i]
             _judge_forces(fixed, memory, share, interval)
             p_now[:] = memory.parameters

@@ -28,7 +28,7 @@ from scenarios.logs.candidate import Candidate
 from scenarios.logs.follower import driven
 from scenarios.logs.free_parameters import BAND, FREE, NOISES, starts
 from scenarios.logs.pieces import prepared
-from twin import OUTPUTS, WHEEL_SPEEDS, Drive, Twin, TwinError, Vehicle
+from twin import OUTPUTS, WHEEL_SPEEDS, WHEELS, Drive, Twin, TwinError, Vehicle
 from twin.car.signals import signals_of
 
 Array = NDArray[np.float64]
@@ -39,6 +39,7 @@ SIZES = {
     **dict.fromkeys(("ax", "ay", "az"), 0.3),
     **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), 0.02),
     **dict.fromkeys(OUTPUTS[WHEEL_SPEEDS], 0.3),
+    **{f"{force}_{wheel}": 150.0 for force in ("fx", "fy", "fz") for wheel in WHEELS},
 }
 HELD_OUT = 0.25  # of each log, at its end, that the result is scored on; chosen
 RATE = 20.0  # [Hz] at which residuals are taken: above what a driver excites
@@ -56,7 +57,7 @@ class Task:
     Attributes:
         candidate: at the start; its values hold also what is not free.
         free: names of `FREE`.
-        signals: of `SIZES`; sideslip is that of the drive's truth.
+        signals: of `SIZES`; sideslip and tyre forces are those of the drive's truth.
         drives: all of what may be used.
         prior_sd: how far a free parameter is believed to lie from its start, by name; nothing is
             believed of the others.
@@ -103,8 +104,8 @@ def _errors(candidate: Candidate, drive: Drive, signals: Sequence[str]) -> Array
 
 def measured(candidate: Candidate, drive: Drive, signal: str) -> Array:
     """(N,) of a signal of a drive, as the candidate's twin should show it."""
-    if signal == "sideslip":
-        return drive.truth["sideslip"]
+    if signal not in OUTPUTS:
+        return drive.truth[signal]
     return drive.channel(signal) - candidate.values.get(f"{signal}_offset", 0.0)
 
 
@@ -138,7 +139,7 @@ def check(task: Task) -> None:
 
 
 def _has(drive: Drive, signal: str) -> bool:
-    if signal == "sideslip":
+    if signal not in OUTPUTS:
         return signal in drive.truth and bool(np.isfinite(drive.truth[signal]).any())
     return signal in drive.output_names and bool(np.isfinite(drive.channel(signal)).any())
 
@@ -301,7 +302,7 @@ def run(
     start = time.perf_counter()
     found = calibrate(task, jobs=jobs, evaluations=evaluations)
     task, found = _as_driven(task, found)
-    task = _with_band(task, found.values)
+    task = with_band(task, found.values)
     write(path, task, logs, found)
     return Result(
         name="calibrate",
@@ -317,7 +318,7 @@ def run(
     )
 
 
-def _with_band(task: Task, values: Array) -> Task:
+def with_band(task: Task, values: Array) -> Task:
     """The task with the factor on the observer's standard deviations that its errors ask for.
 
     95 % of the errors of the sideslip are then below twice the standard deviation.

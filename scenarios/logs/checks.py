@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 LEAST_CORRELATION = 0.5
 SLOPES = (0.8, 1.25)
 LAGS = (-0.1, 0.1)  # [s]
+_BEND = 0.06  # [1/m] of curvature, some 8 degrees of the road wheels
 _REAR_COMPLIANCE = 0.008  # [s2/m] of sideslip behind per lateral acceleration: 4.5 degrees per g
 _AX_SLOPES = (0.9, 1.25)  # gravity on the pitching body adds some 5 %
 _TYPICAL_TRACK = 1.55  # [m]
@@ -168,12 +169,19 @@ def equations(signals: Signals, car: CarFacts | None) -> Iterator[Equation]:
             channels=("vx", *WHEEL_SPEEDS),
             left=signals.known["vx"],
             right=signals.known["wheels"],
-            good=signals.where("vx", "wheels"),
+            good=signals.where("vx", "wheels") & _hardly_bent(signals),
             least=1.0,
             slopes=slopes,
             lags=(-0.12, 0.12),
             unit="m",
         )
+
+
+def _hardly_bent(signals: Signals) -> NDArray[np.bool_]:
+    """(N,) where wheels go as far as the car: front wheels go further in a sharp bend."""
+    if not signals.has("yaw_rate"):
+        return np.ones(signals.time.size, dtype=np.bool_)
+    return np.abs(signals.known["yaw_rate"]) < _BEND * np.abs(signals.known["speed"])
 
 
 def _speed_channels(speed: str) -> tuple[str, ...]:

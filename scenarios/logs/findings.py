@@ -204,11 +204,11 @@ def _offsets(signals: Signals, car: CarFacts | None, checked: Sequence[Check]) -
     for name, fit in made.items():
         if name.startswith(("ax =", "ay =")):
             offsets[name[:2]] = fit.intercept
-        elif name.startswith("rear wheels' difference ~ yaw_rate"):
+        elif name.startswith("rear wheels' difference ~ yaw_rate") and fit.both_signs:
             offsets["yaw_rate"] = -fit.intercept / fit.slope
     for name, fit in made.items():
         yaw = abs(offsets.get("yaw_rate", 0.0)) > _OFFSETS["yaw_rate"]
-        if name.startswith("yaw_rate ~") and not yaw:
+        if name.startswith("yaw_rate ~") and fit.both_signs and not yaw:
             # the angle at which the yaw rate is zero, at the mean speed
             speed = signals.known["speed"][signals.moving].mean()
             turns = car.wheelbase * car.steering_ratio if car else 1.0

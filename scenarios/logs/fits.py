@@ -26,6 +26,7 @@ class Fit(NamedTuple):
         at_lag: correlation with the lag removed.
         drift: by how much the lag grows per second; 0 where it cannot be seen.
         spread: standard deviation of the right side.
+        both_signs: whether the right side has both: else the intercept is extrapolated.
     """
 
     correlation: float
@@ -35,6 +36,7 @@ class Fit(NamedTuple):
     at_lag: float
     drift: float
     spread: float
+    both_signs: bool = False
 
 
 def fit(left: Array, right: Array, good: NDArray[np.bool_], dt: float, *, lags: bool = True) -> Fit:
@@ -59,6 +61,7 @@ def fit(left: Array, right: Array, good: NDArray[np.bool_], dt: float, *, lags: 
         at_lag=at_best,
         drift=_drift(left, right, good, dt) if lags else 0.0,
         spread=spread,
+        both_signs=bool(np.quantile(b, 0.05) < 0.0 < np.quantile(b, 0.95)),
     )
 
 
