@@ -3,6 +3,8 @@ import pytest
 from scenarios.__main__ import main
 from scenarios.experiment import gains_file as gains
 from scenarios.experiment.sideslip_and_mass import BOUNDS, gains_of
+from scenarios.papers import til_tables
+from scenarios.papers.reproduction import Making
 from twin import TwinError
 
 GAINS, PREDICTED = {"a": 1.5, "b": 2.5}, {"a": 1.0, "b": 2.0}
@@ -72,3 +74,14 @@ def test_mistake_on_the_command_line_is_one_line(arguments, message, tmp_path, m
     assert out == ""
     assert len(err.splitlines()) == 1
     assert message in err
+
+
+def test_table_8_prints_gains_that_were_tuned_and_what_they_cost_elsewhere(tmp_path):
+    result = til_tables.table_8(Making(seeds=(0,), jobs=1, out=tmp_path))
+    values = {(row.estimator, row.case, row.quantity): row.median for row in result.rows}
+    for estimator, made in result.settings["made"].items():
+        assert made["evaluations"] >= 60, estimator
+        assert not set(made["tuned_on"]) & set(made["held_out"])
+    assert values["til", "optimised", "yaw_rate"] != values["til", "in use", "yaw_rate"]
+    assert ("til", "in use, held out", "cost, all-scales:laps") in values
+    assert (tmp_path / "til-table-8.png").is_file()

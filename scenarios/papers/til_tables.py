@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from scenarios.experiment.result import Result, Row
 from scenarios.experiment.sideslip_and_mass import BOUNDS, CASE, COMMONROAD, TABLE_8, TWIN
 from scenarios.papers.reproduction import Clock, Making
 from scenarios.plants.mismatch import MISMATCHES
+from scenarios.report.pictures import figure
 from twin import LOAD, Drive, Vehicle
 
 
@@ -84,14 +86,20 @@ JOINT = Recipe(estimator="joint", complete=_joint_of_a_table)
 
 
 def table_8(making: Making) -> Result:
-    """Bounds and optima of the gains, ours beside the paper's."""
+    """Bounds, optima and the gains in use, the paper's optima beside; what they cost elsewhere.
+
+    The optima are those of `til tune`, as `models/gains/tuned` has them with how the search
+    converged; gains in use are others where the optima are worse on what the search did not see.
+    """
     clock = Clock.started()
     found = []
-    for estimator, bounds in BOUNDS.items():
+    made = {estimator: _tuned(estimator) for estimator in BOUNDS}
+    for estimator, tuned in made.items():
         own = sideslip_and_mass.gains_of(TWIN, estimator)
-        for name, ends in bounds.items():
+        for name, ends in tuned["made"]["bounds"].items():
             paper = TABLE_8.get(estimator, {}).get(name)
-            values = {"lower bound": ends[0], "upper bound": ends[1], "optimised": own[name]}
+            values = {"lower bound": ends[0], "upper bound": ends[1], "in use": own[name],
+                      "optimised": tuned["gains"][name]}  # fmt: skip
             found += [
                 Row.over_seeds(
                     [value], case=case, quantity=name, metric="gain",
@@ -100,7 +108,40 @@ def table_8(making: Making) -> Result:
                 )
                 for case, value in values.items()
             ]  # fmt: skip
-    return clock.result("til-table-8", making, found, made={name: _made(name) for name in BOUNDS})
+        found += _costs(estimator, tuned["made"])
+    _draw_convergence(making.out / "til-table-8.png", made)
+    return clock.result(
+        "til-table-8", making, found, made={name: tuned["made"] for name, tuned in made.items()}
+    )
+
+
+def _costs(estimator: str, made: dict[str, Any]) -> list[Row]:
+    """What the gains found and those in use cost where they were not tuned."""
+    cases = {
+        "optimised": {", ".join(made["tuned_on"]): made["cost"], **made["held_out"]},
+        "in use": made["held_out_before"],
+    }
+    return [
+        Row.over_seeds(
+            [value], case=f"{case}, {'tuned on' if name not in made['held_out'] else 'held out'}",
+            quantity=f"cost, {name}", metric=made["metric"], unit="1", estimator=estimator,
+        )
+        for case, costs in cases.items()
+        for name, value in costs.items()
+    ]  # fmt: skip
+
+
+def _draw_convergence(path: Path, made: dict[str, dict[str, Any]]) -> None:
+    """The lowest cost so far over evaluations, relative to the first, of each search."""
+    with figure(path, title="Tuning: lowest cost so far, over that of the first gains") as axes:
+        for estimator, tuned in made.items():
+            after = tuned["made"]["best_after"]
+            counts = [*map(int, after), tuned["made"]["evaluations"]]
+            costs = [*after.values(), tuned["made"]["cost"]]
+            shares = [cost / costs[0] for cost in costs]
+            axes.step(counts, shares, where="post", label=f"{estimator}, {costs[0]:.3g} at first")
+        axes.set(xlabel="evaluations", ylabel="cost", ylim=(0.0, 1.05))
+        axes.legend(loc="lower left")
 
 
 GAIN_UNITS = {
@@ -113,9 +154,9 @@ GAIN_UNITS = {
 }
 
 
-def _made(estimator: str) -> Any:
-    text = (gains_file.FOLDER / f"{TWIN}-{estimator}.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)["made"]
+def _tuned(estimator: str) -> Any:
+    path = gains_file.FOLDER / "tuned" / f"{TWIN}-{estimator}.toml"
+    return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 # Errors of one force at a time: what they do to the mass does not average out

@@ -119,10 +119,14 @@ def tune(
         "at_bounds": _at_bounds(objective, tuned.evaluated),
     }
     checked: dict[str, float] = {}
+    today = {gain.name: gain.today for gain in objective.gains}
+    before: dict[str, float] = {}
     for other in others if chosen.on else ():
-        checked[other] = RunCost(experiment, estimator, name, (other,))(tuned.evaluated)
+        cost_there = RunCost(experiment, estimator, name, (other,))
+        checked[other], before[other] = cost_there(tuned.evaluated), cost_there(today)
     if checked:
         made["held_out"] = {key: _rounded(value) for key, value in checked.items()}
+        made["held_out_before"] = {key: _rounded(value) for key, value in before.items()}
     gains_file.write(
         path,
         vehicle=case.twin,
