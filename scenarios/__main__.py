@@ -14,6 +14,7 @@ import click
 from scenarios.cli import (
     car_commands,
     doctor,
+    live_commands,
     log_commands,
     plan_command,
     study_commands,
@@ -84,6 +85,7 @@ for command in (
     *study_commands.COMMANDS,
     *car_commands.COMMANDS,
     *log_commands.COMMANDS,
+    *live_commands.COMMANDS,
     *weigh_commands.COMMANDS,
     *plan_command.COMMANDS,
     doctor.doctor,

@@ -245,7 +245,7 @@ def test_options_of_limits_reach_what_gives_them(til):
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("drive", "No such command 'drive'. (see til --help)"),
+        ("drive", "No such command 'drive'."),
         ("run", "Missing argument 'NAME'. (see til run --help)"),
         ("run lap", "no scenario 'lap', only fake"),
         ("limits lap", "no scenario 'lap', only fake"),

@@ -155,6 +155,19 @@ class Observer:
         """Says that something else was wrong: estimates have to settle again."""
         self._memory.unsettled[:] = SETTLING
 
+    def forget(self, seconds: float, sd: Mapping[str, float]) -> None:
+        """Lets knowledge that has not been used for a time count less, never less than none.
+
+        Args:
+            seconds: for which nobody watched; each law's drift says what may have changed.
+            sd: what may have changed beside, by parameter.
+        """
+        for law, memory, fresh in zip(self._laws, self._memory.laws, self._fresh, strict=True):
+            if law["form"] == LEAST_SQUARES:
+                extra = sd.get(self.twin.parameters[law["parameter"]], 0.0)
+                widened = memory[PP] + law["drift"] ** 2 * max(seconds, 0.0) + extra**2
+                memory[PP] = min(widened, fresh[PP])
+
     @property
     def trustworthy(self) -> bool:
         """Whether the last sample's estimates are; without a guard nobody looks, and they are."""

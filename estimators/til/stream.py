@@ -134,6 +134,14 @@ class Stream:
         self.counts = dict(zip(self.counts, map(int, more["counts"]), strict=True))
         self._late = []
 
+    def start_again(self, *, fresh: bool = False) -> None:
+        """Starts the twin anew at the next sample, after it has blown up.
+
+        Args:
+            fresh: whether what is known of the parameters goes, too.
+        """
+        self._time = math.nan if fresh else -math.inf
+
     def _is_new(self, time: float) -> bool:
         """Whether a sample is later than the last, or the clock was set back."""
         if not time <= self._time:

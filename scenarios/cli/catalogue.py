@@ -161,3 +161,8 @@ def estimate() -> Any:
 def estimate_stream() -> Any:
     """The module that observes samples from standard input."""
     return import_module("scenarios.logs.stream")
+
+
+def live(name: str) -> Any:
+    """A module of the observer on a bus."""
+    return import_module(f"scenarios.live.{name}")

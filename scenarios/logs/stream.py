@@ -82,15 +82,15 @@ def observe(
         y = [sample.get(name, math.nan) for name in OUTPUTS]
         found = stream.update(sample.get("time", math.nan), u, y, speed=sample.get("vx", math.nan))
         if found:
-            write(_line(found, stream, default))
+            write(json.dumps(told(found, stream, default)))
     if stream is None:
         raise TwinError("standard input: has no samples; allowed: lines of JSON or CSV")
     if state:
         stream.save(state)
     for note in reader.notes():
         print(f"til: {note}", file=report)
-    told = ", ".join(f"{count} {name}" for name, count in stream.counts.items() if count)
-    print(f"til: samples: {told}", file=report)
+    counts = ", ".join(f"{count} {name}" for name, count in stream.counts.items() if count)
+    print(f"til: samples: {counts}", file=report)
     return stream
 
 
@@ -114,26 +114,26 @@ def _default_for(vehicle: Vehicle, sample: Numbers) -> tuple[Default, tuple[str,
     return default, tuple(notes)
 
 
-def _line(sample: Sample, stream: Stream, default: Default) -> str:
-    """An estimate as a line of JSON."""
+def told(sample: Sample, stream: Stream, default: Default) -> dict[str, object]:
+    """An estimate by its names, as JSON has it."""
     observer = stream.observer
     states = dict(zip(observer.twin.states, sample.states.tolist(), strict=True))
-    told: dict[str, object] = {"time": round(sample.time, 9)}
+    found: dict[str, object] = {"time": round(sample.time, 9)}
     sd = observer.parameter_sd()
     for name in default.parameters:
-        told[name] = float(sample.parameters[observer.twin.parameters.index(name)])
+        found[name] = float(sample.parameters[observer.twin.parameters.index(name)])
         if name in sd:
-            told[f"{name}_sd"] = sd[name]
-    told["sideslip"] = math.atan2(states["vy"], max(states["vx"], 1.0))
-    told |= {name: states[name] for name in ("vx", "vy", "yaw_rate")}
+            found[f"{name}_sd"] = sd[name]
+    found["sideslip"] = math.atan2(states["vy"], max(states["vx"], 1.0))
+    found |= {name: states[name] for name in ("vx", "vy", "yaw_rate")}
     resting = [
         name
         for name, bound in default.largest.items()
-        if abs(float(str(told[name]))) >= 0.999 * bound
+        if abs(float(str(found[name]))) >= 0.999 * bound
     ]
-    told["trustworthy"] = sample.trustworthy and not resting
+    found["trustworthy"] = sample.trustworthy and not resting
     if resting:
-        told["at_bound"] = resting
+        found["at_bound"] = resting
     if observer.rejected:
-        told["rejected"] = list(observer.rejected)
-    return json.dumps(told)
+        found["rejected"] = list(observer.rejected)
+    return found
