@@ -15,6 +15,7 @@ def test_table_has_every_parameter_and_only_manoeuvres_with_words():
     assert used <= set(advice.WORDS) == set(MANOEUVRES)
 
 
+@pytest.mark.slow
 def test_table_is_what_the_observer_gains_today():
     computed = seconds_of("step steer", 16.0)
     for name in ("cm_x", "Jyy", "Jzz"):

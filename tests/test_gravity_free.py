@@ -6,9 +6,9 @@ import pyarrow.parquet as pq
 import pytest
 from wrong_maps import LOAD, good_log, the_map
 
-from scenarios.logs.estimate import _with_hills
 from scenarios.logs.estimators import til
 from scenarios.logs.findings import findings, hills
+from scenarios.logs.mass_interval import with_hills
 from scenarios.logs.pieces import prepared
 from twin import WHEELS, Drive, Vehicle
 
@@ -58,7 +58,7 @@ def test_with_their_slope_they_give_the_mass(hilly):
     found = til(vehicle, prepared(drive, 1e-3))
     hill = hills(drive, vehicle)
     assert hill == pytest.approx(0.44, abs=0.1)
-    found = _with_hills(found, hill)
+    found = with_hills(found, hill)
     assert 30.0 < found.sd["mass"] < 120.0
     assert abs(found.estimate["mass"][-1] - LOAD) < 1.96 * found.sd["mass"]
 
