@@ -1,8 +1,9 @@
-"""Logs in MCAP, MATLAB's .mat and RaceLogic's .vbo, written here and read back."""
+"""Logs in MCAP, MATLAB's .mat, RaceLogic's .vbo and AiM's .xrk, written here and read back."""
 
 import json
 import struct
 import warnings
+import zlib
 
 import numpy as np
 import pytest
@@ -188,6 +189,66 @@ def test_vbo_is_read_with_its_clock_and_units(tmp_path):
     assert "1 rows that have not 5 cells are left out." in log.notes
 
 
+def aim_message(token, body):
+    framed = token.ljust(4).encode()
+    tail = b"<" + framed + struct.pack("<H", sum(body) & 0xFFFF) + b">"
+    return b"<h" + framed + struct.pack("<iB", len(body), 1) + b">" + body + tail
+
+
+def aim_channel(index, name, unit, period):
+    body = bytearray(112)
+    struct.pack_into("<H", body, 0, index)
+    body[12], body[16], body[20], body[72] = unit, 9, 6, 4  # of a CAN bus, numbers of 4 bytes
+    body[24:32] = name[:8].encode().ljust(8, b"\0")
+    body[32:56] = name.encode().ljust(24, b"\0")
+    struct.pack_into("<I", body, 64, 1000 * period)
+    return aim_message("CHS", bytes(body))
+
+
+def xrk(path, gps=True):
+    """Yaw rate [deg/s] every 10 ms, a speed [km/h] every 20 ms, both from 1 s on."""
+    kinds = (("Yaw Rate", 5, 10), ("Speed", 16, 20))
+    head = b"".join(aim_channel(i, *kind) for i, kind in enumerate(kinds))
+    content = aim_message("CNF", head)
+    for index, (_, _, period) in enumerate(kinds):
+        for stamp in range(1000, 3000, period):
+            content += b"(S" + struct.pack("<iHf", stamp, index, stamp / 100.0) + b")"
+    if gps:
+        content += aim_message("GPS", struct.pack("<i", 1000) + bytes(52))
+        content += aim_message("TRK", bytes(64))
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_xrk_is_read_with_its_clock_and_units(tmp_path, packed):
+    path = xrk(tmp_path / "log.xrk")
+    if packed:
+        path = tmp_path / "log.xrz"
+        path.write_bytes(zlib.compress((tmp_path / "log.xrk").read_bytes()))
+    log = format_of(path).read_log(path, Wanted())
+    yaw_rate, speed = log.channels["Yaw Rate"], log.channels["Speed"]
+    assert (yaw_rate.unit, speed.unit) == ("deg/s", "km/h")
+    np.testing.assert_allclose(np.diff(yaw_rate.time), 0.01, atol=1e-9)
+    np.testing.assert_allclose(speed.time, np.arange(0.0, 2.0, 0.02), atol=1e-9)
+    np.testing.assert_allclose(speed.values, 10.0 + speed.time / 0.1, rtol=1e-6)
+    assert "GPS Speed" in log.text  # the one sample that the test wrote
+
+
+def test_xrk_without_gps_is_refused_with_the_way_out(tmp_path):
+    path = xrk(tmp_path / "log.xrk", gps=False)
+    with pytest.raises(TwinError, match="allowed: a log with GPS, or an export as CSV"):
+        format_of(path).read_log(path, Wanted())
+
+
+def test_xrz_that_unpacks_to_more_than_fits_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("twin.logs.aim._LARGEST_UNPACKED", 10_000)
+    path = tmp_path / "bomb.xrz"
+    path.write_bytes(zlib.compress(bytes(1_000_000)))
+    with pytest.raises(TwinError, match="has over 10,000 bytes"):
+        format_of(path).read_log(path, Wanted())
+
+
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
     """Sound files of each kind."""
@@ -198,11 +259,12 @@ def sound(tmp_path_factory):
     io.savemat(folder / "sound.mat", {"t": TIME - TIME[0], "a": A}, do_compression=True)
     rows = [f"008 1200{0.02 * k:05.2f} {k} 90 0.1" for k in range(N)]
     (folder / "sound.vbo").write_text(VBO + "\n".join(rows))
+    xrk(folder / "sound.xrk")
     (folder / "sound.csv").write_text("t,a\n" + "".join(f"{k},{k}\n" for k in range(N)))
     return folder
 
 
-@pytest.mark.parametrize("kind", ["mcap", "mat", "vbo", "csv"])
+@pytest.mark.parametrize("kind", ["mcap", "mat", "vbo", "xrk", "csv"])
 @settings(deadline=None, max_examples=40)
 @given(data=st.data())
 def test_damaged_file_is_read_or_ends_in_one_line(sound, kind, data):

@@ -21,6 +21,7 @@ EXTRAS = {
     "dask": ("distributed", "many runs on a Dask cluster (--dask)"),
     "mdf": ("asammdf", "logs in MDF 4"),
     "can": ("cantools", "raw CAN logs"),
+    "aim": ("libxrk", "logs of AiM's loggers"),
     "ros": ("mcap_ros2", "logs in MCAP, of ROS 2"),
     "mat": ("h5py", "logs in MATLAB 7.3"),
     "commonroad": ("vehiclemodels", "CommonRoad's multi-body car as the real vehicle"),

@@ -14,6 +14,7 @@ FORMATS = {
     ".mcap": "twin.logs.mcap",
     ".mat": "twin.logs.mat",
     ".vbo": "twin.logs.vbo",
+    **dict.fromkeys((".xrk", ".xrz"), "twin.logs.aim"),
 }
 
 
