@@ -1,4 +1,4 @@
-"""Commands of `til` for one's own car and tyres: new-car, new-tyre."""
+"""Commands of `til` for one's own car and tyres: new-car, new-tyre, fit-tyre."""
 
 from pathlib import Path
 
@@ -75,4 +75,28 @@ def new_tyre(size: str, load_index: int | None, out: Path | None) -> None:
     click.echo(f"{path} describes a tyre; a car's file names it as tyre.front.file.")
 
 
-COMMANDS = (new_car, new_tyre)
+@click.command("fit-tyre")
+@click.argument("data", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.tir",
+    help="The tyre file; a picture of fit over data goes beside it.",
+)
+@click.option("--size", metavar="SIZE", help="As '205/55R16 91V': for what DATA does not tell.")
+@_load_index
+def fit_tyre(data: tuple[Path, ...], out: Path, size: str | None, load_index: int | None) -> None:
+    """Fit a tyre file (.tir, MF 5.2) to DATA, measurements on a tyre test bench.
+
+    DATA is MATLAB's .mat or a table of text in columns SA, SL or SR, IA, FX, FY, FZ, MZ, P, with
+    units. Without longitudinal slip in it the coefficients of F_x are those of the start.
+    """
+    module = catalogue.tyre_fit()
+    fit, picture = module.fit_to_file(data, out, size, load_index)
+    for line in (*fit.notes, *module.sentences(fit)):
+        click.echo(line)
+    click.echo(f"{out} describes the tyre; {picture} shows the fit over the data.")
+
+
+COMMANDS = (new_car, new_tyre, fit_tyre)

@@ -136,6 +136,11 @@ def new_car() -> Any:
     return import_module("scenarios.calibration.new_car")
 
 
+def tyre_fit() -> Any:
+    """The module that fits a tyre to measurements."""
+    return import_module("scenarios.calibration.tyre_report")
+
+
 def weigh() -> tuple[Any, Callable[[str], Any]]:
     """The module that weighs recorded drives, and what reads the name of a reference."""
     return import_module("scenarios.weighing.weigh"), pkgutil.resolve_name(

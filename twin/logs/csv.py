@@ -71,6 +71,16 @@ def read_log(path: Path, wanted: Wanted) -> RawLog:
     return log_of_table(path, _numbers(path, file, layout), wanted.time)
 
 
+def read_table(path: Path) -> Numbers:
+    """The columns of a table that need not be a log: it has no time.
+
+    Raises:
+        TwinError: the file cannot be read, or is no table.
+    """
+    file = open_text(path)
+    return _numbers(path, file, _layout(path, file, frozenset()))
+
+
 def _layout(path: Path, file: TextFile, names: frozenset[str]) -> Layout:
     found = find_table(file.lines[:_HEAD_LINES], names - {""})
     if found is None:

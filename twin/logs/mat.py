@@ -39,6 +39,20 @@ def read_log(path: Path, wanted: Wanted) -> RawLog:
     Raises:
         TwinError: the file cannot be read.
     """
+    vectors, found = read_vectors(path)
+    text = {name: str(value)[:40] for name, value in _flat(found, "", 0) if name not in vectors}
+    own = _with_own_time(path, vectors, text)
+    if own:
+        return own
+    return _with_shared_time(path, vectors, text, wanted.time)
+
+
+def read_vectors(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
+    """All vectors by dotted name, and the content of the file by the names of its variables.
+
+    Raises:
+        TwinError: the file cannot be read.
+    """
     check_file_size(path)
     with path.open("rb") as file:
         head = file.read(520)
@@ -54,11 +68,7 @@ def read_log(path: Path, wanted: Wanted) -> RawLog:
     except Exception as error:  # of every kind: both libraries raise what their parts do
         raise TwinError(f"{path}: cannot be read as MATLAB: {reason(error)[:200]}") from error
     vectors = {name: value for name, value in flat.items() if isinstance(value, np.ndarray)}
-    text = {name: str(value)[:40] for name, value in flat.items() if name not in vectors}
-    own = _with_own_time(path, vectors, text)
-    if own:
-        return own
-    return _with_shared_time(path, vectors, text, wanted.time)
+    return vectors, found
 
 
 def _of_version_5(path: Path) -> dict[str, Any]:

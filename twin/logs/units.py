@@ -42,6 +42,7 @@ UNITS = {
         "kNm": 1e3,
         "lbf ft": 1.3558179483,
     },
+    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216153},
     "pressure": {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0, "psi": 0.0689475729},
     "slope": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "%": 0.01},
     "number": {"1": 1.0},
@@ -86,6 +87,7 @@ _ALIASES = {
         "kN m": "kn*m kn.m kn·m",
         "lbf ft": "lb-ft lbft lbfft ft-lb ftlb ft-lbf ftlbf lbf-ft lb*ft ft*lb lb.ft lbs-ft ft-lbs",
     },
+    "force": {"N": "newton newtons", "lbf": "lb lbs pound pounds"},
     "pressure": {"bar": "bars", "psi": "lbf/in2 psig psia", "kPa": "kilopascal", "Pa": "pascal"},
     "length": {
         "m": "meter metre meters metres",
@@ -202,7 +204,7 @@ _SPELLINGS = _spellings()
 # Units of channels that nobody maps, by which a row of units is recognised
 _OTHERS = {
     "%", "1", "-", "#", "v", "mv", "a", "ma", "ohm", "hz", "khz", "°c", "c", "°f", "f", "degc",
-    "k", "l", "l/h", "g/s", "kg", "kg/s", "km", "mi", "ft", "w", "kw", "hp", "ps", "n", "kn", "j",
+    "k", "l", "l/h", "g/s", "kg", "kg/s", "km", "mi", "ft", "w", "kw", "hp", "ps", "j",
     "bool", "count", "counts", "raw", "ticks", "fix", "datetime", "date", "mbar", "hpa", "lambda",
     "afr", "ratio",
 }  # fmt: skip
