@@ -96,7 +96,6 @@ def read(name: str) -> Log:
         raise TwinError(f"{VARIABLE}: is {place!r}; allowed: a folder with {name}.parquet")
     table = pq.read_table(path)
     columns = {n: table[n].to_numpy().astype(np.float64) for n in table.column_names}
-    columns["delta"] = 0.5 * (columns["delta_L"] + columns["delta_R"])
     late = _late(columns)
     for channel in NAVIGATION:
         columns[channel] = np.interp(columns["time"] + late, columns["time"], columns[channel])

@@ -82,6 +82,14 @@ def test_road_wheel_angle_and_one_speed():
         np.testing.assert_allclose(drive.channel(f"wheel_speed_{wheel}"), 20.0 / 0.35)
 
 
+def test_road_wheel_angle_is_the_mean_of_both_wheels():
+    signals = {"road_wheel_angle_left": ("deg", 2.0), "road_wheel_angle_right": ("deg", 1.0)}
+    drive = made(signals, axes="SAE")
+    np.testing.assert_allclose(drive.channel("steering_wheel_angle"), -16.0 * np.radians(1.5))
+    with pytest.raises(TwinError, match="without the other wheel's"):
+        made({"road_wheel_angle_left": ("deg", 2.0)})
+
+
 def test_course_over_ground_gives_the_yaw_rate():
     course = np.degrees(0.1 * TIME + 6.2) % 360.0  # clockwise: to the right
     drive = made({"course": ("deg", course), "vx": ("m/s", 10.0)})

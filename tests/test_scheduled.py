@@ -6,7 +6,7 @@ import pytest
 from estimators.entry import Given
 from estimators.registry import ESTIMATORS, make
 from estimators.til.scheduled import ScheduledObserver
-from estimators.til.scheduled_kernel import LARGEST_SLIP, Noise
+from estimators.til.scheduled_kernel import LARGEST_SLIP, Noise, _predict, _update
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
 from twin import OUTPUTS, Drive, Twin, TwinError, Vehicle
@@ -64,6 +64,25 @@ def test_corrections_take_a_third_off_the_error_of_a_free_twin(other):
     assert error_deg(corrected, other) < 0.65 * error_deg(free, other)
     assert np.isfinite(corrected.states).all()
     assert len(corrected.sideslip) == len(other)
+
+
+def test_covariance_of_a_model_that_grows_stays_positive():
+    """As of a car that brakes at its limit: rounding errors must not become negative variances."""
+    transition = np.eye(4)
+    transition[:2, :2] = [[1.02, -0.5], [0.002, 1.01]]
+    transition[:2, 2:] = [[1e-5, 1e-5], [1e-5, -1e-5]]
+    p, noise = np.zeros((6, 6)), Noise(vy=0.1, rear=0.01)
+    p[np.arange(4), np.arange(4)] = [0.25, 0.01, 2.4e5, 2.4e5]
+    of_ay = np.array([-2.0, 0.1, 1e-3, 1e-3, 1.0, 0.0])
+    of_yaw_rate = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+    for _ in range(3000):
+        _predict(p, transition, noise, 982.0, 0.1, 1.0, 0.01)
+        _update(p, np.zeros(6), of_ay, 0.0, noise.ay**2 / 0.01)
+        _update(p, np.zeros(6), of_yaw_rate, 0.0, noise.measured_yaw_rate**2 / 0.01)
+        assert (p == p.T).all()
+        assert (np.diag(p)[:4] > 0.0).all()
+        scaled = p[:4, :4] / np.sqrt(np.outer(np.diag(p)[:4], np.diag(p)[:4]))
+        assert np.linalg.eigvalsh(scaled)[0] > 0.0
 
 
 def test_sensor_noise_does_not_spoil_a_twin_of_the_same_car():

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from twin import Drive
 from twin.logs.spikes import without_spikes
 
 TIME = np.arange(1000) / 100.0
@@ -38,3 +39,21 @@ def test_slow_log_stays_as_it_is():
     spoilt = STEERING.copy()
     spoilt[100] += 0.2
     assert without_spikes(10.0 * TIME, spoilt)[1] == 0
+
+
+def test_spikes_of_road_wheels_are_left_out():
+    spoilt = STEERING.copy()
+    spoilt[500] += 0.2
+    wheel = {"name": "delta", "unit": "rad"}
+    log_map = {
+        "rate": 100,
+        "follow_speed": True,
+        "time": {"name": "t", "unit": "s"},
+        "channels": {"road_wheel_angle": wheel, "vx": {"name": "v", "unit": "m/s"}},
+        "constants": {"road_height": 0.0},
+        "car": {"steering_ratio": 2.0},
+    }
+    frame = {"t": TIME, "delta": spoilt, "v": np.full_like(TIME, 20.0)}
+    drive = Drive.from_frame(frame, log_map)
+    found = drive.channel("steering_wheel_angle")
+    np.testing.assert_allclose(found, 2.0 * STEERING, atol=1e-3)

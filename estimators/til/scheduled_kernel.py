@@ -194,17 +194,22 @@ def _predict(p, transition, noise, mass, share, moving, dt):
 
 @njit(cache=True, nogil=True)
 def _update(p, x, h, innovation, variance):
-    """A scalar measurement h x; returns the square of what it says anew, in its variance."""
+    """A scalar measurement h x; returns the square of what it says anew, in its variance.
+
+    The covariance is updated in Joseph's form, which keeps it symmetric and positive: a model that
+    grows, as a car that brakes at its limit does, else turns rounding errors into negative
+    variances.
+    """
     ph = p @ h
     s = h @ ph + variance
     left = innovation - h @ x
     square = left * left / s
     left = min(max(left, -CLIPPED * math.sqrt(s)), CLIPPED * math.sqrt(s))
-    for i in range(NX):
-        x[i] += ph[i] / s * left
-    for i in range(NX):
-        for j in range(NX):
-            p[i, j] -= ph[i] * ph[j] / s
+    gain = ph / s
+    x += gain * left
+    rest = np.eye(NX) - np.outer(gain, h)
+    joseph = rest @ p @ rest.T + variance * np.outer(gain, gain)
+    p[:] = 0.5 * (joseph + joseph.T)
     return square
 
 

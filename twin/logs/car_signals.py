@@ -19,6 +19,8 @@ from twin.toml_file import Table
 
 DRIVEN = ("front", "rear", "all")
 _WHEEL_SPEEDS = tuple(f"wheel_speed_{wheel}" for wheel in WHEELS)
+_LEFT, _RIGHT = "road_wheel_angle_left", "road_wheel_angle_right"
+_ROAD_WHEELS = ("road_wheel_angle", _LEFT, _RIGHT)
 _SLOWEST = 3.0  # [m/s] at which a course over ground tells a yaw rate
 
 # Signals of cars, and which of our channels each gives
@@ -32,6 +34,8 @@ GIVES: dict[str, tuple[str, ...]] = {
     "brake_pressure_front": ("brake_torque_fl", "brake_torque_fr"),
     "brake_pressure_rear": ("brake_torque_rl", "brake_torque_rr"),
     "road_wheel_angle": ("steering_wheel_angle",),
+    "road_wheel_angle_left": ("steering_wheel_angle",),
+    "road_wheel_angle_right": ("steering_wheel_angle",),
     "course": ("yaw_rate",),
     "slope": (),
     "bank": (),
@@ -133,7 +137,7 @@ def derive(
         (("speed",), _of_speed),
         (("motor_torque", "motor_torque_front", "motor_torque_rear"), _of_motors),
         (("brake_pressure", "brake_pressure_front", "brake_pressure_rear"), _of_pressures),
-        (("road_wheel_angle",), _of_road_wheels),
+        (_ROAD_WHEELS, _of_road_wheels),
     ):
         if any(name in columns for name in names):
             done += function(columns, car)
@@ -237,8 +241,16 @@ def _of_pressures(columns: dict[str, Array], car: CarSignals) -> list[str]:
 
 def _of_road_wheels(columns: dict[str, Array], car: CarSignals) -> list[str]:
     ratio = _needed(car, "steering_ratio", "road_wheel_angle")
-    columns["steering_wheel_angle"] = ratio * columns["road_wheel_angle"]
-    return [f"steering_wheel_angle: that of the road wheels times {ratio:g}."]
+    sides = [name for name in (_LEFT, _RIGHT) if name in columns]
+    if sides and ("road_wheel_angle" in columns or len(sides) == 1):
+        raise TwinError(
+            f"{sides[0]} is given without the other wheel's or beside road_wheel_angle; allowed: "
+            f"{_LEFT} and {_RIGHT}, or road_wheel_angle alone"
+        )
+    angle = 0.5 * (columns[_LEFT] + columns[_RIGHT]) if sides else columns["road_wheel_angle"]
+    columns["steering_wheel_angle"] = ratio * angle
+    of = "the mean of both road wheels" if sides else "that of the road wheels"
+    return [f"steering_wheel_angle: {of} times {ratio:g}."]
 
 
 def _of_course(columns: dict[str, Array], dt: float) -> list[str]:

@@ -36,9 +36,10 @@
                             # steering_ratio, radius
 
 Instead of ours, [channels] may have signals as cars have them: `motor_torque` (or `_front` and
-`_rear`) with `gear`; `brake_pressure` (or `_front` and `_rear`); `road_wheel_angle`; `speed`, one
-for all wheels; `course` over ground; and, for accelerations free of gravity, `slope` (uphill
-positive) and `bank` (the road's left side higher), as angles or in %. See `twin.logs.car_signals`.
+`_rear`) with `gear`; `brake_pressure` (or `_front` and `_rear`); `road_wheel_angle`, or those of
+both front wheels, `road_wheel_angle_left` and `_right`; `speed`, one for all wheels; `course` over
+ground; and, for accelerations free of gravity, `slope` (uphill positive) and `bank` (the road's
+left side higher), as angles or in %. See `twin.logs.car_signals`.
 
 A number v of the log becomes sign * unit * factor * (v - offset). In SAE axes y points to the right
 and z down: signs of ay, az, pitch and yaw rate, pitch, v_y, sideslip and hand wheel turn round.
@@ -63,6 +64,8 @@ MEASURABLE = (*OUTPUTS, *FURTHER_OUTPUTS)
 TURNED = (
     "steering_wheel_angle",
     "road_wheel_angle",
+    "road_wheel_angle_left",
+    "road_wheel_angle_right",
     "ay",
     "az",
     "pitch_rate",

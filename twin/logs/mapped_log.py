@@ -65,8 +65,8 @@ def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Dri
     done = [*log.notes, *_about_time(grid, log_map)]
     columns = {}
     for name, channel in ours.items():
-        if name == STEERING:
-            channel, spikes = _without_spikes(channel)
+        if name == STEERING or STEERING in GIVES.get(name, ()):
+            channel, spikes = _without_spikes(channel, name)
             done += spikes
         columns[name] = resample(channel.time, channel.values, grid, log_map.longest_gap)
         done.append(_about_channel(name, log_map, channel, columns[name]))
@@ -146,12 +146,12 @@ def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
     return Channel(time=time, values=values, unit=unit)
 
 
-def _without_spikes(channel: Channel) -> tuple[Channel, list[str]]:
+def _without_spikes(channel: Channel, name: str) -> tuple[Channel, list[str]]:
     """The channel without single samples that stand out, and a sentence about them."""
     values, count = without_spikes(channel.time, channel.values)
     if not count:
         return channel, []
-    sentence = f"{STEERING}: {count} single samples that stand out are left out."
+    sentence = f"{name}: {count} single samples that stand out are left out."
     return replace(channel, values=values), [sentence]
 
 

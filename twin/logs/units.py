@@ -125,7 +125,9 @@ _KINDS = {
     "speed": "speed",
     **dict.fromkeys(("motor_torque", "motor_torque_front", "motor_torque_rear"), "torque"),
     **dict.fromkeys(("brake_pressure", "brake_pressure_front", "brake_pressure_rear"), "pressure"),
-    **dict.fromkeys(("road_wheel_angle", "course"), "angle"),
+    **dict.fromkeys(
+        ("road_wheel_angle", "road_wheel_angle_left", "road_wheel_angle_right", "course"), "angle"
+    ),
     **dict.fromkeys(("slope", "bank"), "slope"),
     "gear": "number",
 }
