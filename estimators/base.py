@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimators.export import Curve, frame_of, plot_curves, save_columns
 from twin import EXTENDED, OUTPUTS, PARAMETERS, STATES, Drive, TwinError
 
 Array = NDArray[np.float64]
@@ -126,6 +128,68 @@ class Estimate:
             return np.full(self.time.size, np.nan)
         vx, vy = (self.states[:, self.state_names.index(name)] for name in ("vx", "vy"))
         return np.arctan2(vy, np.maximum(vx, SLOWEST))
+
+    @property
+    def mass(self) -> Array:
+        """(N,) estimated mass of the chassis with its load [kg]; the load is `estimate["mass"]`."""
+        return self.absolute("mass")
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """(N,) histories by name: time, what was estimated and its sd, sideslip, states, outputs.
+
+        Parameters are changes from nominal. Standard deviations are called `<name>_sd`.
+        """
+        found: dict[str, NDArray[Any]] = {"time": self.time}
+        for name in self.estimated:
+            found[name] = self[name]
+            if self.sd is not None:
+                found[f"{name}_sd"] = self.sd_of(name)
+        if np.isfinite(self.sideslip).any():
+            found["sideslip"] = self.sideslip
+        if self.sideslip_sd is not None:
+            found["sideslip_sd"] = self.sideslip_sd
+        for names in (self.state_names, self.output_names):
+            found |= {name: self[name] for name in names if name not in found}
+        if self.trustworthy is not None:
+            found["trustworthy"] = self.trustworthy
+        return found
+
+    def to_frame(self) -> Any:
+        """The `columns` as a DataFrame of pandas, with the time [s] as its index.
+
+        Raises:
+            TwinError: pandas is not installed.
+        """
+        return frame_of(self.columns())
+
+    def save(self, path: str | Path) -> None:
+        """Writes the `columns` as Parquet or CSV, by the name's ending, whole or not at all.
+
+        Raises:
+            TwinError: the ending is unknown, or the file cannot be written.
+        """
+        save_columns(self.columns(), path)
+
+    def plot(self, *names: str) -> Any:
+        """A figure of matplotlib: histories in bands of two sd; grey where not trustworthy.
+
+        Args:
+            names: what is drawn, [SI]; by default what was estimated, and the sideslip.
+
+        Raises:
+            TwinError: there is no such name, or matplotlib is not installed.
+        """
+        chosen = names or (*(n for n in self.estimated if n in self.parameter_names), "sideslip")
+        curves = [self._curve(name) for name in chosen]
+        return plot_curves(self.time, curves, self.trustworthy)
+
+    def _curve(self, name: str) -> Curve:
+        if name == "sideslip":
+            sd = self.sideslip_sd
+            return Curve(
+                "sideslip [deg]", np.degrees(self.sideslip), None if sd is None else np.degrees(sd)
+            )
+        return Curve(name, self[name], self.sd_of(name) if name in self.estimated else None)
 
 
 def sideslip_estimate(time: Array, sideslip: Array, sd: Array | None = None) -> Estimate:

@@ -46,6 +46,18 @@ def test_there_are_the_pages_that_the_readme_names():
     assert named == {page.name for page in PAGES}
 
 
+def test_python_of_the_readme_estimates_the_load(tmp_path):
+    ((_, _, text),) = blocks(ROOT / "README.md")
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", text], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    load, sd = map(float, re.findall(r"(-?\d+) kg", done.stdout))
+    assert abs(load - 355.0) < 2.0 * sd < 50.0
+    assert (tmp_path / "estimate.csv").is_file()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_page_can_be_followed(page, tmp_path):
     follow(page, tmp_path, slow=False)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from estimators.til.default_observer import default_observer
 from scenarios.driving.manoeuvres import urban
 from scenarios.driving.record import record
-from scenarios.logs.default_observer import default_observer
 from twin import OUTPUTS, STATES, Twin, Vehicle, with_noise
 
 VARIATION = 355.0

@@ -91,8 +91,9 @@ def test_filter_is_the_same_for_vehicle_and_twin():
 @pytest.mark.parametrize("damping", [0.3, 0.65])
 def test_mode_filter_has_the_response_of_its_transfer_function(frequency, damping):
     law = ParameterLaw(
-        parameter="Jxx", signal="roll_acceleration", mode_frequency=2.0, mode_damping=damping
-    )
+        parameter="Jxx", signal="roll_acceleration", mode_frequency=2.0, mode_damping=damping,
+        prior_sd=1.0, noise_density=1.0,
+    )  # fmt: skip
     s, w = 2j * np.pi * frequency, 2.0 * np.pi * 2.0
     expected = s**2 / (s**2 + 2.0 * damping * w * s + w**2)
     found = phasor(frequency, regressors(law, sine(frequency, 4.0)))
@@ -101,14 +102,16 @@ def test_mode_filter_has_the_response_of_its_transfer_function(frequency, dampin
 
 def test_without_mode_and_lag_the_instrument_is_the_regressor():
     signal = np.random.default_rng(0).normal(size=100)
-    law = ParameterLaw(parameter="mass", signal="ax")
+    law = ParameterLaw(parameter="mass", signal="ax", prior_sd=1.0, noise_density=1.0)
     np.testing.assert_array_equal(regressors(law, signal), signal)
 
 
 @pytest.mark.parametrize("samples", [1, 7, 150])
 def test_lag_is_exactly_that_many_samples(samples):
     signal = np.random.default_rng(0).normal(size=500)
-    law = ParameterLaw(parameter="Jyy", signal="ax", lag=samples * DT)
+    law = ParameterLaw(
+        parameter="Jyy", signal="ax", lag=samples * DT, prior_sd=1.0, noise_density=1.0
+    )
     lagged = regressors(law, signal)
     np.testing.assert_array_equal(lagged[:samples], 0.0)
     np.testing.assert_array_equal(lagged[samples:], signal[:-samples])
@@ -127,7 +130,13 @@ def test_lag_is_of_the_instrument_and_not_of_the_innovation():
 
 def test_laws_of_one_observer_have_lags_of_their_own():
     laws, memory = compile_laws(
-        [ParameterLaw(parameter="mass", signal="ax", lag=lag * DT) for lag in (2, 5)], DT
+        [
+            ParameterLaw(
+                parameter="mass", signal="ax", lag=lag * DT, prior_sd=1.0, noise_density=1.0
+            )
+            for lag in (2, 5)
+        ],
+        DT,
     )
     signal = np.arange(1.0, 21.0)
     for k, lag in enumerate((2, 5)):
@@ -183,7 +192,7 @@ def test_least_squares_claim_the_variance_of_the_fit_to_all_samples_at_once():
 
 
 def test_drift_makes_the_variance_grow_where_nothing_is_learnt():
-    law = ParameterLaw(parameter="mass", signal="ax", prior_sd=10.0, drift=4.0)
+    law = ParameterLaw(parameter="mass", signal="ax", prior_sd=10.0, noise_density=1.0, drift=4.0)
     laws, memory = compile_laws([law], DT)
     nothing = np.zeros(len(OUTPUTS))
     for _ in range(1000):
@@ -251,7 +260,9 @@ def test_integral_law_may_have_a_negative_gain_and_others_may_not():
 
 @pytest.mark.parametrize("name", ["largest_yaw_rate", "compensation"])
 def test_law_that_needs_a_cars_outputs_is_refused_without_them(name):
-    law = ParameterLaw(parameter="mass", signal="ax", **{name: 0.1})
+    law = ParameterLaw(
+        parameter="mass", signal="ax", prior_sd=1.0, noise_density=1.0, **{name: 0.1}
+    )
     with pytest.raises(TwinError, match=rf"{name} is 0\.1; this black box, without"):
         compile_laws([law], DT, outputs=("ax",))
 

@@ -17,7 +17,7 @@ from scenarios.experiment.truck_plant import SAMPLE_TIME
 from twin import OUTPUTS, TruckParameters, TwinError, Vehicle
 
 SUV = Vehicle.load("suv")
-LAW = ParameterLaw(parameter="mass", signal="ax", scale=2000.0)
+LAW = ParameterLaw(parameter="mass", signal="ax", scale=2000.0, prior_sd=1.0, noise_density=1.0)
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from estimators.til.default_observer import default_observer
 from estimators.til.observer import Observer
 from estimators.til.stream import LONGEST_GAP, SET_BACK, Stream, between, rolling_radius
 from scenarios.driving.manoeuvres import urban
 from scenarios.driving.record import record
-from scenarios.logs.default_observer import default_observer
 from twin import INPUTS, OUTPUTS, Twin, TwinError, Vehicle, with_noise
 
 VEHICLE = Vehicle.load("suv")

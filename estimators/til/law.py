@@ -94,9 +94,10 @@ class ParameterLaw:
         mode_frequency: of the free twin [Hz], which the regressor is filtered by; zero: none.
         mode_damping: damping ratio of that mode.
         lag: of the instrument [s].
-        prior_sd: of the least-squares form, of the parameter before the first sample.
-        noise_density: of the least-squares form, of the signal's noise [unit of the signal over
-            the root of Hz]: standard deviation times the root of the sample time.
+        prior_sd: of the least-squares form, which demands it: of the parameter before the first
+            sample.
+        noise_density: of the least-squares form, which demands it: of the signal's noise [unit of
+            the signal over the root of Hz]: standard deviation times the root of the sample time.
         drift: of the least-squares form, of the parameter [unit over the root of s]: forgetting.
         leak: of the integral form, of what the law itself has added [1/s].
         offset_sd: of the least-squares form, of the signal's offset; zero: there is none.
@@ -120,8 +121,8 @@ class ParameterLaw:
     form: Form = "least-squares"
     gain: float = 0.0
     scale: float = 1.0
-    prior_sd: float = 1.0
-    noise_density: float = 1.0
+    prior_sd: float = math.nan
+    noise_density: float = math.nan
     drift: float = 0.0
     leak: float = 0.0
     offset_sd: float = 0.0
@@ -160,7 +161,8 @@ class ParameterLaw:
         for name in ("largest_yaw_rate", "largest_compensation", "largest"):
             if not getattr(self, name) > 0.0:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
-        for name in ("prior_sd", "noise_density", "filter_time"):
+        demanded = ("prior_sd", "noise_density") if self.form == "least-squares" else ()
+        for name in (*demanded, "filter_time"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise TwinError(f"law: {name} is {getattr(self, name)}; allowed: more than 0")
 
@@ -236,11 +238,11 @@ def compile_laws(
         row["differentiated"] = law.signal in ACCELERATIONS
         row["measured"] = law.instrument == "measured"
         row["form"] = FORMS.index(law.form)
-        row["intensity"] = law.noise_density**2
+        row["intensity"] = np.nan_to_num(law.noise_density) ** 2
         row["mode_frequency"] = 2.0 * math.pi * law.mode_frequency
         row["lag"] = round(law.lag / dt)
     memory = np.zeros((len(laws), RING + max(table["lag"], default=0)))
-    memory[:, PP] = [law.prior_sd**2 for law in laws]
+    memory[:, PP] = [np.nan_to_num(law.prior_sd) ** 2 for law in laws]
     memory[:, OO] = [law.offset_sd**2 for law in laws]
     return table, memory
 

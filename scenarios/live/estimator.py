@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from estimators.til.default_observer import default_observer
 from estimators.til.stream import Stream
 from scenarios.live.signals import BusSignals
-from scenarios.logs.default_observer import default_observer
 from scenarios.logs.stream import told
 from twin import PARAMETERS, WHEELS, TwinError, Vehicle
 

@@ -11,10 +11,10 @@ from estimators.base import Estimate
 from estimators.joint.noise import noise_of_record
 from estimators.joint.observer import JointObserver, JointSettings
 from estimators.joint.real_car import REAL_CAR
+from estimators.til.default_observer import default_observer
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
 from scenarios.logs.candidate import Candidate
-from scenarios.logs.default_observer import default_observer
 from scenarios.logs.follower import driven
 from scenarios.logs.free_parameters import FREE
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed

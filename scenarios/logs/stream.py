@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TextIO
 
+from estimators.til.default_observer import Default, default_observer
 from estimators.til.stream import Sample, Stream
-from scenarios.logs.default_observer import Default, default_observer
 from scenarios.logs.lines import LineReader, Numbers
 from scenarios.logs.pieces import ROAD
 from twin import INPUTS, OUTPUTS, TwinError, Vehicle

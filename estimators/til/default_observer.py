@@ -7,6 +7,7 @@ comes from the longitudinal acceleration, cleared of what the wheel speeds' corr
 
 import math
 from collections.abc import Set
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from estimators.til.law import ParameterLaw
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
-from twin import WHEELS, Twin, Vehicle
+from twin import OUTPUTS, WHEELS, Twin, Vehicle
 
 # Gains [1/s], of TiL Eq. (23); ay -> vy has no unit. Chosen: the prototype's of the joint observer
 # on a sports car's laps, which the noise of a common IMU leaves alone.
@@ -75,6 +76,24 @@ def default_observer(
         left_out=tuple(left_out),
         largest={law.parameter: law.largest for law in laws},
     )
+
+
+def til_observer(car: str | Path | Vehicle, measured: Set[str] = frozenset(OUTPUTS)) -> Observer:
+    """The observer of states and mass that `til estimate` uses.
+
+    >>> from estimators import til_observer
+    >>> observer = til_observer("suv")
+    >>> observer.reset(speed=10.0)  # [m/s]; then observer.run(drive), or update(u, y) by samples
+
+    Args:
+        car: its name or file, or a `Vehicle`.
+        measured: names of `twin.OUTPUTS` that the drive has; without ax there is no mass.
+
+    Raises:
+        TwinError: the car's files are missing or broken.
+    """
+    vehicle = car if isinstance(car, Vehicle) else Vehicle.load(car)
+    return default_observer(vehicle, measured, mass="ax" in measured).observer
 
 
 def mass_law(twin: Twin, radius: float, measured: Set[str]) -> ParameterLaw:
