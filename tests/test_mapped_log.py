@@ -173,13 +173,28 @@ def test_gap_in_a_measurement_is_nan_and_short_ones_are_bridged(tmp_path):
     np.testing.assert_allclose(drive.channel("ax")[good], drive.time[good], atol=1e-9)
 
 
-def test_gap_in_an_input_is_refused(tmp_path):
-    time = np.concatenate([np.arange(0, 5, 0.01), np.arange(6, 9, 0.01)])
+@pytest.mark.parametrize("end", [5.8, 7.0])
+def test_gap_in_an_input_is_bridged_or_cut_out(tmp_path, end):
+    time = np.concatenate([np.arange(0, 5, 0.01), np.arange(end, 9, 0.01)])
     path = write_csv(tmp_path / "log.csv", {"t": time, "s": time})
     text = '[channels.steering_wheel_angle]\nname="s"\nunit="deg"\n'
     text += "[constants]\ndrive_torque = 0\nbrake_torque = 0\nroad_height = 0\n"
+    drive = Drive.load(path, written(tmp_path / "map.toml", text))
+    assert f"missing from 4.991 to {end - 0.001:g} s" in done(drive)
+    assert ("that time is left out" in done(drive)) == (end == 7.0)
+    assert np.diff(drive.time).max() == pytest.approx(0.001 if end < 6.0 else 2.01)
+    assert "samples missing in 1 gap." in done(drive)
+
+
+def test_input_that_is_never_there_beside_the_others_is_refused(tmp_path):
+    time = np.arange(0, 9, 0.01)
+    drive, steer = np.where(time < 4, 1.0, np.nan), np.where(time > 5, 1.0, np.nan)
+    path = write_csv(tmp_path / "log.csv", {"t": time, "s": steer, "d": drive})
+    text = '[channels.steering_wheel_angle]\nname="s"\nunit="deg"\n'
+    text += '[channels.drive_torque_fl]\nname="d"\nunit="N m"\n[constants]\nroad_height = 0\n'
+    text += "".join(f"drive_torque_{w} = 0\n" for w in ("fr", "rl", "rr")) + "brake_torque = 0\n"
     message = refusal(Drive.load, path, written(tmp_path / "map.toml", text))
-    assert "input steering_wheel_angle has a gap of 1.01 s in all, first at 4.991 s" in message
+    assert "no two samples have all inputs" in message
 
 
 def test_log_faster_than_the_drive_is_averaged_not_picked(tmp_path):

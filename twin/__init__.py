@@ -42,6 +42,7 @@ from twin.channels import (
 from twin.errors import TwinError, TwinWarning
 from twin.fmu.names import FmuNames
 from twin.logs.drive import Drive
+from twin.logs.input_gaps import LONGEST_GAP
 from twin.noise import noise_sd, with_noise
 from twin.parameters import (
     AXLE_FORCES,
@@ -94,6 +95,7 @@ __all__ = [
     "INERTIA",
     "INPUTS",
     "LOAD",
+    "LONGEST_GAP",
     "OUTPUTS",
     "PARAMETER",
     "PARAMETERS",

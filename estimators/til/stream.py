@@ -2,7 +2,8 @@
 
 Between two samples inputs and measurements are linear. A gap is bridged: inputs are held,
 measurements are missing. After a long one the twin starts again at the measured speed and keeps
-what is known of the parameters. Samples that come late, twice or without a time are dropped and
+what is known of the parameters. The same holds for samples in which an input is missing: nothing
+counts as measured in them. Samples that come late, twice or without a time are dropped and
 counted; when nothing but late ones come the clock was set back, and a new time begins.
 """
 
@@ -16,12 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimators.til.observer import Observer
 from estimators.til.snapshot import load_snapshot, save_snapshot
-from twin import WHEELS
+from twin import LONGEST_GAP, WHEELS
 
 Array = NDArray[np.float64]
 
 LONGEST_STEP = 0.15  # [s] between samples; what is longer is a gap. Chosen: a channel of 10 Hz
-LONGEST_GAP = 1.0  # [s] that is bridged; chosen: held torques take a car off by 3 m/s by then
 FASTEST = 150.0  # [m/s] at which a twin can start
 SET_BACK = 10  # late samples in a row, in order among themselves, that make a new time; chosen
 _SLACK = 1e-3  # of a step: time stamps are rounded
@@ -61,6 +61,7 @@ class Stream:
         )
         self._radius = rolling_radius
         self._time = math.nan  # of the last sample
+        self._complete = math.nan  # of the last sample with all inputs
         self._start = math.nan  # of the twin's first step
         self._steps = 0  # since then
         self._u = np.full(len(observer.twin.inputs), np.nan)
@@ -75,7 +76,8 @@ class Stream:
 
         Args:
             time: [s].
-            u: (nu,) inputs; what is not finite is held from the last sample.
+            u: (nu,) inputs; what is not finite is held from the last sample, and nothing counts
+                as measured meanwhile, see `twin.LONGEST_GAP`.
             y: (ny,) measurements, NaN where there is none.
             speed: measured [m/s], if it is; else the wheels tell it where a twin starts.
 
@@ -93,10 +95,15 @@ class Stream:
             self.counts["late"] += 1
             return None
         u, held = self._held(np.array(u, dtype=np.float64))
+        if held and not time - self._complete <= LONGEST_GAP:
+            self.counts["incomplete"] += 1
+            if not math.isnan(self._time):
+                self._time = -math.inf  # the twin starts again when the inputs are back
+            return None
         gap = time - self._time
         if math.isnan(gap) or gap > LONGEST_GAP:
             speed = speed if math.isfinite(speed) else self._measured_speed(y)
-            if np.isnan(u).any() or not abs(speed) < FASTEST:
+            if held or not abs(speed) < FASTEST:
                 self.counts["incomplete"] += 1
                 return None
             self._begin(time, max(speed, 0.0), fresh=math.isnan(gap))
@@ -104,8 +111,13 @@ class Stream:
             self.counts["gaps"] += 1
         if held:
             self.counts["held"] += 1
-            self.observer.distrust()
+            y[:] = np.nan
+        else:
+            self._complete = time
         sample = self._advance(time, u, y)
+        if held:
+            self.observer.distrust()
+            sample = sample and sample._replace(trustworthy=False)
         self.counts["taken"] += 1
         self._time, self._u, self._y = time, u, y
         return sample
@@ -129,6 +141,7 @@ class Stream:
         """
         more = load_snapshot(path, self.observer)
         self._time, self._start, steps = more["clock"].tolist()
+        self._complete = self._time
         self._steps = int(steps)
         self._u, self._y = more["u"], more["y"]
         self.counts = dict(zip(self.counts, map(int, more["counts"]), strict=True))

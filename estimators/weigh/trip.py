@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 PEDAL = "accelerator_pedal"
 SLOWEST_RATE = 2.0  # [Hz]; acceleration changes within half a second
 _NEEDS = "weighing needs ax, vx and the drive torques"
+_MOST_CUT = 100  # a trip lasts at most so many times what it has samples for
 _UNIFORMITY = 0.02  # of the sample time; clocks of loggers
 
 
@@ -127,12 +128,33 @@ class Trip:
             np.sum([drive.channel(n) for n in drive.input_names if n.startswith(kind)], axis=0)
             for kind in ("drive_torque", "brake_torque")
         )
+        time, at = _with_cuts(drive.time)
+
+        def spread(values: Array) -> Array:
+            whole = np.full(time.size, np.nan)
+            whole[at] = values
+            return whole
+
         return cls(
             name=name,
-            time=drive.time,
-            force=torque / radius,
-            speed=drive.channel("vx"),
-            acceleration=drive.channel("ax"),
-            pedal=drive.channel(PEDAL) if PEDAL in drive.output_names else None,
-            brake=brake if np.any(brake) else None,
+            time=time,
+            force=spread(torque / radius),
+            speed=spread(drive.channel("vx")),
+            acceleration=spread(drive.channel("ax")),
+            pedal=spread(drive.channel(PEDAL)) if PEDAL in drive.output_names else None,
+            brake=spread(brake) if np.any(brake) else None,
         )
+
+
+def _with_cuts(time: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Uniform times over the gaps that were cut out of a drive, and where its samples are in them.
+
+    Args:
+        time: (N,) [s]; samples that are not uniform by themselves stay as they are.
+    """
+    step = float(np.median(np.diff(time)))
+    at = np.round((time - time[0]) / step).astype(np.int64)
+    cut = at[-1] >= time.size and (np.diff(at) > 0).all() and at[-1] < _MOST_CUT * time.size
+    if not cut or np.abs(time - time[0] - step * at).max() > _UNIFORMITY * step * at[-1]:
+        return time, np.arange(time.size)
+    return time[0] + step * np.arange(at[-1] + 1), at

@@ -24,9 +24,11 @@ from scenarios.logs.estimators import ESTIMATORS, Found
 from scenarios.logs.findings import Finding, findings, hills
 from scenarios.logs.mass_interval import with_hills, with_torque_accuracy
 from scenarios.logs.pieces import lacking, measured, prepared
+from scenarios.logs.trust_spans import distrust_gaps
 from twin import Drive, TwinError, Vehicle
 from twin.car.fingerprint import fingerprint
 from twin.car.signals import signals_of
+from twin.logs.input_gaps import gaps_of, sentences
 from twin.logs.mapped_log import NEEDS
 from twin.logs.raw_log import check_file_size
 from twin.toml_file import reason
@@ -183,7 +185,8 @@ def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
     if not told:
         names = measured(log.pieces)
         wanted = {quantity: lacking(quantity, names) for quantity in NEEDS}
-        told = tuple(
+        told = tuple(sentences(gaps_of(drive.settings)))
+        told += tuple(
             f"{quantity} cannot be estimated without {', '.join(missing)}."
             for quantity, missing in wanted.items()
             if missing
@@ -192,6 +195,7 @@ def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
     wrong = findings(longest, vehicle)
     found = with_hills(ESTIMATORS[task.estimator](vehicle, log), hills(longest, vehicle))
     found = with_torque_accuracy(found, vehicle)
+    found = found._replace(estimate=distrust_gaps(found.estimate, log.pieces[0]))
     return _with_findings(found, wrong), (*told, *log.done)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from scenarios.logs.checks import Check, checks
 from scenarios.logs.findings import findings
+from scenarios.logs.pieces import longest_stretch
 from twin import Drive, Vehicle
 from twin.car.signals import signals_of
 from twin.logs.drive import NoDrive
@@ -94,11 +95,17 @@ def _row(channel: Channel) -> tuple[str, ...]:
 
 def _checks(drive: Drive, car: Vehicle | None) -> str:
     rows = [("check", "correlation", "slope", "unit", "lag [s]", "verdict")]
-    rows += [_shown(check) for check in checks(drive, car)]
-    found = findings(drive, car)
+    longest = longest_stretch(drive)
+    rows += [_shown(check) for check in checks(longest, car)]
+    found = findings(longest, car)
     lines = [f"  {finding}" for finding in found] or ["  nothing that does not fit."]
     if car is None:
         lines.append("  Without --vehicle, torques and the steering's unit are not checked.")
+    if len(longest) < len(drive):
+        lines.append(
+            f"  Looked at {longest.time[0]:.6g} to {longest.time[-1]:.6g} s, the longest time "
+            "without a gap."
+        )
     return "\n".join([_aligned(rows), "", "Findings:", *lines])
 
 

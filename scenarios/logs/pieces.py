@@ -55,6 +55,17 @@ def prepared(drive: Drive, dt: float) -> Prepared:
     return Prepared(tuple(started), tuple(done), follows)
 
 
+def longest_stretch(drive: Drive) -> Drive:
+    """The longest part of a drive without a gap in time; all of it if it has none."""
+    steps = np.diff(drive.time)
+    cuts = np.flatnonzero(steps > max(LONGEST_GAP, 1.5 * float(np.median(steps)))) + 1
+    if not cuts.size:
+        return drive
+    bounds = [0, *cuts.tolist(), len(drive)]
+    first, last = max(pairwise(bounds), key=lambda part: part[1] - part[0])
+    return drive[first:last] if last - first > 1 else drive
+
+
 def measured(pieces: Sequence[Drive]) -> set[str]:
     """Names of the measurements that there are, and of inputs that no map declares constant.
 
@@ -137,12 +148,15 @@ def _with_all_channels(drive: Drive, done: list[str]) -> tuple[Drive, bool]:
 def _uniform(drive: Drive, dt: float, done: list[str]) -> list[Drive]:
     """Pieces of the sample time; a drive that has it stays as it is."""
     steps = np.diff(drive.time)
-    if np.abs(steps - dt).max() <= 1e-6 * dt + 2.0 * np.spacing(np.abs(drive.time).max()):
+    if _has_steps_of(dt, drive.time):
         return [drive]
     cuts = np.flatnonzero(steps > LONGEST_GAP) + 1
     short = np.count_nonzero((steps > LONGEST_STEP) & (steps <= LONGEST_GAP))
     step = float(np.median(steps))
-    done.append(f"Samples every {step:.4g} s are brought to every {dt:g} s, linear between them.")
+    if abs(step - dt) > 1e-6 * dt:
+        done.append(
+            f"Samples every {step:.4g} s are brought to every {dt:g} s, linear between them."
+        )
     if short:
         done.append(
             f"{short} gaps of up to {LONGEST_GAP:g} s are bridged: inputs held, nothing measured."
@@ -161,9 +175,17 @@ def _uniform(drive: Drive, dt: float, done: list[str]) -> list[Drive]:
     return good
 
 
+def _has_steps_of(dt: float, time: Array) -> bool:
+    """Whether times have that step throughout."""
+    rounding = 2.0 * np.spacing(np.abs(time).max())
+    return bool(np.abs(np.diff(time) - dt).max() <= 1e-6 * dt + rounding)
+
+
 def _on_grid(drive: Drive, part: slice, dt: float) -> Drive | None:
     """A part of a drive at uniform times; None if it is shorter than two of them."""
     time = drive.time[part]
+    if _has_steps_of(dt, time):
+        return drive[part]
     n = int((time[-1] - time[0]) / dt + 1e-3) + 1
     if n < 2:
         return None

@@ -17,6 +17,7 @@ from estimators.til.default_observer import Default, default_observer
 from estimators.til.stream import Sample, Stream
 from scenarios.logs.lines import LineReader, Numbers
 from scenarios.logs.pieces import ROAD
+from scenarios.logs.stream_gaps import StreamGaps
 from twin import INPUTS, OUTPUTS, TwinError, Vehicle
 from twin.logs.map import LogMap
 from twin.logs.text_file import encoding_of
@@ -68,7 +69,7 @@ def observe(
         TwinError: see `run`.
     """
     report = report or sys.stderr
-    stream, default = None, None
+    stream, default, gaps = None, None, StreamGaps()
     reader = LineReader(log_map)
     for sample in reader.samples(lines):
         if stream is None or default is None:
@@ -78,16 +79,20 @@ def observe(
                 stream.restore(state)
             for note in notes:
                 print(f"til: {note}", file=report)
-        u = [sample.get(name, 0.0 if name in ROAD else math.nan) for name in INPUTS]
+        inputs = {name: sample.get(name, 0.0 if name in ROAD else math.nan) for name in INPUTS}
         y = [sample.get(name, math.nan) for name in OUTPUTS]
-        found = stream.update(sample.get("time", math.nan), u, y, speed=sample.get("vx", math.nan))
+        time, speed = sample.get("time", math.nan), sample.get("vx", math.nan)
+        found = stream.update(time, list(inputs.values()), y, speed=speed)
+        for sentence in gaps.take(time, inputs) if math.isfinite(time) else ():
+            print(f"til: {sentence}", file=report)
         if found:
-            write(json.dumps(told(found, stream, default)))
+            missing = {"missing": list(gaps.missing)} if gaps.missing else {}
+            write(json.dumps(told(found, stream, default) | missing))
     if stream is None:
         raise TwinError("standard input: has no samples; allowed: lines of JSON or CSV")
     if state:
         stream.save(state)
-    for note in reader.notes():
+    for note in (*reader.notes(), *gaps.notes()):
         print(f"til: {note}", file=report)
     counts = ", ".join(f"{count} {name}" for name, count in stream.counts.items() if count)
     print(f"til: samples: {counts}", file=report)

@@ -1,7 +1,7 @@
 """When an estimate is not trustworthy, and why: times, channels and reasons."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,8 +9,10 @@ import numpy as np
 from estimators.base import Estimate
 from estimators.til.measurement_validation import SETTLING
 from twin import Drive
+from twin.logs.input_gaps import LONGEST_GAP, InputGap, gaps_of
 
 _MOST = 20  # spans that are listed; more are counted in the last one
+_GAPS = 3  # gaps in inputs that a span's reason names
 _SHORT = 0.05  # [s]; spans nearer than that are one
 
 
@@ -28,6 +30,24 @@ class Span:
     end: float
     reason: str
     channels: tuple[str, ...] = ()
+
+
+def distrust_gaps(estimate: Estimate, drive: Drive) -> Estimate:
+    """The estimate, not trustworthy where inputs were interpolated, nor until it has settled.
+
+    Args:
+        estimate: over the drive.
+        drive: N samples, with the gaps of its inputs among its settings.
+    """
+    bridged = [gap for gap in gaps_of(drive.settings) if gap.bridged]
+    if not bridged:
+        return estimate
+    trusted = np.ones(estimate.time.size, dtype=np.bool_)
+    if estimate.trustworthy is not None:
+        trusted &= estimate.trustworthy
+    for gap in bridged:
+        trusted[(estimate.time >= gap.start) & (estimate.time <= gap.end + SETTLING)] = False
+    return replace(estimate, trustworthy=trusted)
 
 
 def trust_spans(estimate: Estimate, drive: Drive) -> tuple[Span, ...]:
@@ -75,13 +95,36 @@ def _runs(estimate: Estimate) -> Iterator[tuple[int, int]]:
 
 def _span(estimate: Estimate, drive: Drive, first: int, last: int) -> Span:
     time = estimate.time
+    start = float(time[first])
+    if _follows_a_cut(drive, first):
+        start = float(time[first - 1])
+    gaps = [gap for gap in gaps_of(drive.settings) if gap.start <= time[last] and gap.end >= start]
+    if gaps:
+        names = tuple(dict.fromkeys(name for gap in gaps for name in gap.names))
+        return Span(start=start, end=float(time[last]), reason=_of_gaps(gaps), channels=names)
     channels = _missing(drive, first, last)
     return Span(
-        start=float(time[first]),
+        start=start,
         end=float(time[last]),
         reason=_reason(estimate, drive, first, last, channels),
         channels=channels,
     )
+
+
+def _follows_a_cut(drive: Drive, first: int) -> bool:
+    """Whether the twin has started again at that sample."""
+    return first > 0 and bool(drive.time[first] - drive.time[first - 1] > LONGEST_GAP)
+
+
+def _of_gaps(gaps: Sequence[InputGap]) -> str:
+    """What gaps in inputs do to the estimates of a span."""
+    told = [
+        f"{', '.join(gap.names)} missing from {gap.start:.2f} to {gap.end:.2f} s"
+        + (", interpolated" if gap.bridged else ", the twin started again")
+        for gap in gaps[:_GAPS]
+    ]
+    more = f" and {len(gaps) - _GAPS} more times" if len(gaps) > _GAPS else ""
+    return "; ".join(told) + more
 
 
 def _reason(
@@ -91,6 +134,8 @@ def _reason(
         told = estimate.reasons[int(estimate.trust_reason[first])]
         if told:
             return told
+    if _follows_a_cut(drive, first):
+        return "the log has a gap before it, the twin started again"
     if channels:
         return f"{', '.join(channels)}: missing in the log"
     seconds = float(estimate.time[last] - estimate.time[first])

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import TwinError
 from twin.logs.formats import format_of
+from twin.logs.input_gaps import mended
 from twin.toml_file import reason
 
 if TYPE_CHECKING:
@@ -223,6 +224,8 @@ class Drive:
     ) -> "Drive":
         """Reads what `save` wrote, to the bit, or a log of anybody by its map.
 
+        Gaps in inputs are bridged or cut out, see `twin.logs.input_gaps`.
+
         Args:
             path: the file.
             map: a TOML file, see `twin.logs.map`; `twin.logs.mapped_log` says what comes of it.
@@ -244,8 +247,7 @@ class Drive:
                 "'twin_drive'; a log of another program needs a map"
             )
         try:
-            settings = _settings(metadata)
-            return cls(settings=settings, **_sorted_out(columns))
+            return cls(**mended(_sorted_out(columns), _settings(metadata)))
         except TwinError as error:
             raise TwinError(f"{path}: {error}") from error
 
@@ -272,7 +274,7 @@ class Drive:
             return drive_of(log_of_frame(frame, log_map.wanted.time), log_map)
         columns, metadata = columns_of(frame)
         settings = _settings(metadata) if metadata else {}
-        return cls(settings=settings, **_sorted_out(columns))
+        return cls(**mended(_sorted_out(columns), settings))
 
     def to_frame(self, kind: str = "pandas") -> Any:
         """The drive as a table: columns as in a file (`measurement.ax`), the time as the index.

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.channels import FURTHER_OUTPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
@@ -12,9 +13,10 @@ from twin.logs import can
 from twin.logs.car_signals import GIVES, CarSignals, derive
 from twin.logs.drive import Drive
 from twin.logs.formats import format_of
+from twin.logs.input_gaps import WithoutGaps, as_settings, runs, sentences, without_gaps
 from twin.logs.map import TORQUES, LogMap, Source, unit_in_si
 from twin.logs.raw_log import Array, Channel, RawLog, check_size, listed
-from twin.logs.resampling import FASTER, gaps, resample
+from twin.logs.resampling import FASTER, resample
 from twin.logs.spikes import without_spikes
 from twin.logs.units import kind_of, our_unit
 
@@ -49,7 +51,8 @@ def load_drive(path: str | Path, map_path: str | Path, car: CarSignals | None = 
         car: what the car makes of its signals; the map's table [car] comes first.
 
     Raises:
-        TwinError: the log or the map is missing or broken, they do not fit, or an input has gaps.
+        TwinError: the log or the map is missing or broken, they do not fit, or an input is nowhere
+            beside the others.
     """
     log_map = LogMap.load(map_path)
     reader = can if log_map.database else format_of(path)
@@ -87,19 +90,23 @@ def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Dri
         raise TwinError(f"{log_map.path}: {error}") from None
     if log_map.follow_speed:
         done.append("The log has no torques: the twin is to follow the measured vx.")
-    for name in log_map.input_names:
-        _check_input(log, log_map, name, grid, columns[name])
+    inputs = _inputs(log, log_map, grid, columns)
+    columns |= inputs.columns
+    done += sentences(inputs.gaps)
     names = (*OUTPUTS, *(name for name in FURTHER_OUTPUTS if name in columns))
     missing = np.full(grid.size, np.nan)
     done += _about_missing(columns)
     done += _about_estimates(columns, log_map)
+    measurements = np.column_stack([columns.get(name, missing) for name in names])
+    measurements[inputs.bridged] = np.nan
+    there = inputs.kept
     return Drive(
-        time=grid,
-        inputs=np.column_stack([columns[name] for name in log_map.input_names]),
+        time=grid[there],
+        inputs=np.column_stack([columns[name][there] for name in log_map.input_names]),
         input_names=log_map.input_names,
-        measurements=np.column_stack([columns.get(name, missing) for name in names]),
+        measurements=measurements[there],
         output_names=names,
-        truth=kept,
+        truth={name: values[there] for name, values in kept.items()},
         settings={
             "log": {
                 "file": log.path.name,
@@ -107,6 +114,7 @@ def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Dri
                 "rate": _rate(ours),
                 "follow_speed": log_map.follow_speed,
                 "constants": list(log_map.constants),
+                "input_gaps": as_settings(inputs.gaps),
                 "done": done,
             }
         },
@@ -185,14 +193,21 @@ def _grid(log: RawLog, log_map: LogMap, ours: Mapping[str, Channel]) -> Array:
     return start + np.arange(int(steps) + 1) / log_map.rate
 
 
-def _check_input(log: RawLog, log_map: LogMap, name: str, grid: Array, values: Array) -> None:
-    missing = ~np.isfinite(values)
-    if missing.any():
-        first = grid[int(np.argmax(missing))]
-        raise TwinError(
-            f"{log.path}: input {name} has a gap of {missing.sum() / log_map.rate:.3g} s in all, "
-            f"first at {first:.6g} s; allowed: {log_map.longest_gap:g} s each (longest_gap)"
-        )
+def _inputs(log: RawLog, log_map: LogMap, grid: Array, columns: Mapping[str, Array]) -> WithoutGaps:
+    """The inputs, their gaps bridged or to be cut out.
+
+    Raises:
+        TwinError: no two samples have all of them.
+    """
+    found = without_gaps(grid, {name: columns[name] for name in log_map.input_names})
+    if found is not None:
+        return found
+    missing = {name: int(np.isnan(columns[name]).sum()) for name in log_map.input_names}
+    name = max(missing, key=lambda name: missing[name])
+    raise TwinError(
+        f"{log.path}: input {name} is missing in {missing[name]} of {grid.size} samples, and no "
+        "two samples have all inputs; allowed: all inputs at the same time, or a longer longest_gap"
+    )
 
 
 def _rate(ours: Mapping[str, Channel]) -> float:
@@ -228,10 +243,21 @@ def _about_channel(name: str, log_map: LogMap, channel: Channel, values: Array) 
         parts.append(f"brought forward by {source.delay:g} s")
     if rate > FASTER * log_map.rate:
         parts.append("averaged over each sample of the drive")
-    missing = int(np.count_nonzero(np.isnan(values)))
-    if missing:
-        parts.append(f"{missing} samples missing in {len(gaps(channel.time))} gaps and at the ends")
+    if np.isnan(values).any():
+        parts.append(_about_gaps(np.isnan(values)))
     return ", ".join(parts) + "."
+
+
+def _about_gaps(missing: NDArray[np.bool_]) -> str:
+    """Where samples (N,) of the drive are missing, some of them."""
+    found = runs(missing)
+    ends = [place for place, there in (("start", missing[0]), ("end", missing[-1])) if there]
+    inside = len(found) - len(ends)
+    where = [f"in {inside} gap{'s' if inside != 1 else ''}"] if inside > 0 else []
+    where += [f"at the {place}" for place in ends]
+    if missing.all():
+        return "all samples missing"
+    return f"{np.count_nonzero(missing)} samples missing {' and '.join(where)}"
 
 
 def _about_missing(columns: Mapping[str, Array]) -> list[str]:
