@@ -90,6 +90,19 @@ def test_sensor_noise_does_not_spoil_a_twin_of_the_same_car():
     assert error_deg(observed(drive), drive) < 0.25
 
 
+def test_start_in_a_bend_knows_the_sideslip(other):
+    """Of a drive that begins in a bend, the first second is not worse than the same one later."""
+    ay = np.abs(other.channel("ay"))
+    k = int(np.argmax(np.convolve(ay, np.full(500, 1.0 / 500), "valid")))
+    rest = other[k:]
+    whole, started = observed(other), observed(rest)
+    truth = np.degrees(rest.truth["sideslip"])[:500]
+    assert np.abs(truth).max() > 1.0
+    of_whole = np.degrees(whole.sideslip)[k : k + 500] - truth
+    of_started = np.degrees(started.sideslip)[:500] - truth
+    assert np.sqrt(np.mean(of_started**2)) < np.sqrt(np.mean(of_whole**2)) + 0.2
+
+
 def test_band_holds_most_errors(other):
     estimate = observed(other)
     error = np.abs(estimate.sideslip - other.truth["sideslip"])[1000:]

@@ -7,7 +7,6 @@ twin's directly; torques, where a log has none, are made from the longitudinal a
 wheel slips more than a bound. A twin that leaves the measured world is reset, and a note says so.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -24,6 +23,7 @@ from estimators.til.scheduled_kernel import (
     ANGLE,
     BLOWN_UP,
     LAG,
+    MOVING,
     ROLL,
     SLOWEST,
     SOUND,
@@ -31,6 +31,7 @@ from estimators.til.scheduled_kernel import (
     History,
     Memory,
     Noise,
+    doubt_anew,
     new_memory,
     observe,
     renew,
@@ -58,6 +59,8 @@ _REASONS = (
 )
 _MISSING, _HELD = 4, 5
 LONGEST_GAP = 0.5  # [s] of a measurement, beyond which the estimate is not trusted; chosen
+STEADY, FIRST = 20.0, 0.1  # [s] that a bend lasts before a start, that its yaw rate is the mean of
+_YAW_RATE = STATES.index("yaw_rate")
 _RADIUS_SPEED = 10.0  # [m/s] at which rolling radii are taken
 
 
@@ -132,15 +135,11 @@ class ScheduledObserver:
         self._road = (0.0, 0.0, 0.0, 0.0) if road is None else road
         self._settle(speed)
 
-    def _settle(self, speed: float, yaw_rate: float = 0.0) -> None:
+    def _settle(self, speed: float) -> None:
         assert self._memory is not None
         renew(self._memory, self._fixed.mass, speed)
         self.twin.set_parameters(self._memory.parameters)
         self.twin.reset(max(speed, 0.0), self._road)
-        if math.isfinite(yaw_rate):
-            dx = np.zeros(len(STATES))
-            dx[STATES.index("yaw_rate")] = yaw_rate
-            self.twin.correct(dx)
 
     def run(self, drive: Drive) -> ScheduledEstimate:
         """Observes a drive, from the state that the observer is in.
@@ -155,18 +154,9 @@ class ScheduledObserver:
         inputs, measurements, speeds, torqueless = _given(drive, twin)
         fixed = self._fixed._replace(torqueless=torqueless)
         n = len(drive)
-        history = History(
-            states=np.zeros((n, len(twin.states))),
-            parameters=np.zeros((n, len(twin.parameters))),
-            outputs=np.zeros((n, len(twin.outputs))),
-            extended=np.zeros((n, len(twin.extended))),
-            held=np.zeros(n),
-            sd=np.zeros((n, 6)),
-            consistency=np.ones((n, 3)),
-        )
+        history = _history(n, twin)
         notes, k = [], 0
-        yaw_rates = measurements[:, twin.outputs.index("yaw_rate")]
-        self._turn(yaw_rates[0])
+        self._take_bend(inputs, measurements, 0)
         while True:
             k, fault = observe(twin.car, fixed, memory, inputs, measurements, speeds, k, history)
             if fault == SOUND:
@@ -180,18 +170,64 @@ class ScheduledObserver:
                     f"drive: the twin had to be reset {TOO_OFTEN} times until t = "
                     f"{drive.time[k]:.3f} s; this is another car, or its steering or speed is wrong"
                 )
-            self._settle(float(memory.speed[0]), float(yaw_rates[k]))
+            self._settle(float(memory.speed[0]))
+            self._take_bend(inputs, measurements, k)
             memory.consistency[:] = 2.0 * LARGEST_SQUARE
             k += 1
         return _observed(drive, history, notes, twin, _missing(measurements, twin))
 
-    def _turn(self, yaw_rate: float) -> None:
-        """Starts a twin that has just settled with the measured yaw rate."""
-        states = self.twin.read_states()
-        if math.isfinite(yaw_rate) and states[STATES.index("yaw_rate")] == 0.0:
-            dx = np.zeros(len(STATES))
-            dx[STATES.index("yaw_rate")] = yaw_rate
-            self.twin.correct(dx)
+    def _take_bend(self, inputs: Array, measurements: Array, k: int) -> None:
+        """Brings a twin that has just settled into the bend that it is to start in, at sample k.
+
+        Steering, speed and yaw rate of the drive are held for `STEADY`, as if the car had always
+        driven so, and the observer corrects the twin as ever. The twin then starts with its roll,
+        its tyres' slip and the axle forces that such a bend asks for.
+        """
+        memory, twin, names = self._memory, self.twin, self.twin.outputs
+        assert memory is not None
+        first = measurements[k : k + max(round(FIRST / twin.dt), 1), names.index("yaw_rate")]
+        speed = float(memory.speed[0])
+        if not np.isfinite(first).any() or twin.read_states()[_YAW_RATE] != 0.0:
+            return
+        yaw_rate = float(np.nanmean(first))
+        here = twin.snapshot()
+        _turn(twin, yaw_rate)
+        if speed < MOVING:
+            return
+        n = round(STEADY / twin.dt)
+        held = np.full((n, len(names)), np.nan)
+        held[:, names.index("ay")], held[:, names.index("yaw_rate")] = speed * yaw_rate, yaw_rate
+        held[:, names.index("ay")] += memory.offsets[0]
+        held[:, names.index("yaw_rate")] += memory.offsets[1]
+        _, fault = observe(
+            twin.car, self._fixed, memory, np.tile(inputs[k], (n, 1)), held, np.full(n, speed), 0,
+            _history(n, twin),
+        )  # fmt: skip
+        memory.consistency[:] = 1.0
+        doubt_anew(memory, self._fixed.mass, speed)
+        if fault != SOUND:
+            renew(memory, self._fixed.mass, speed)
+            twin.set_parameters(memory.parameters)
+            twin.restore(here)
+            _turn(twin, yaw_rate)
+
+
+def _turn(twin: Twin, yaw_rate: float) -> None:
+    dx = np.zeros(len(STATES))
+    dx[_YAW_RATE] = yaw_rate - twin.read_states()[_YAW_RATE]
+    twin.correct(dx)
+
+
+def _history(n: int, twin: Twin) -> History:
+    return History(
+        states=np.zeros((n, len(twin.states))),
+        parameters=np.zeros((n, len(twin.parameters))),
+        outputs=np.zeros((n, len(twin.outputs))),
+        extended=np.zeros((n, len(twin.extended))),
+        held=np.zeros(n),
+        sd=np.zeros((n, 6)),
+        consistency=np.ones((n, 3)),
+    )
 
 
 def _given(drive: Drive, twin: Twin) -> tuple[Array, Array, Array, bool]:

@@ -39,6 +39,7 @@ LEAST_FORCE = 0.5  # [m/s2] over the car's mass: standard deviation of an axle's
 # would go further is held, and not believed for `HELD_TIME`. Chosen: half of what gravity adds on a
 # bank of 3 degrees is left for it; the calibrated cars stay below two thirds
 KINEMATIC_TIME, LARGEST_GAP, HELD_TIME = 3.0, 1.5, 5.0  # [s], [m/s], [s]
+UNSTEADY = 0.25  # share of the doubt at the start that a steady bend leaves; chosen
 # A twin beyond these limits is reset
 LARGEST_ROLL = 0.5  # [rad]
 LARGEST_ANGLE = 0.9  # [rad] of sideslip, at more than `MOVING`
@@ -137,6 +138,15 @@ def renew(memory: Memory, mass: float, speed: float) -> None:
     memory.parameters[list(FORCES)] = 0.0
     memory.innovation[:] = 0.0
     memory.kinematic[0] = 0.0
+
+
+def doubt_anew(memory: Memory, mass: float, speed: float) -> None:
+    """Believes the twin's states no more than a bend that was assumed to be steady tells."""
+    share = min(max(speed, 0.0) / MOVING, 1.0)
+    sd = UNSTEADY * np.array([0.5 * share, 0.1 * share, 0.5 * mass, 0.5 * mass])
+    memory.p[np.arange(4), np.arange(4)] += sd**2
+    memory.innovation[:] = 0.0
+    memory.kinematic[1] = 0.0
 
 
 @njit(cache=True, nogil=True)
