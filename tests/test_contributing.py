@@ -122,7 +122,8 @@ drive = Drive(time=0.001 * np.arange(300), inputs=u, input_names=INPUTS, measure
               output_names=OUTPUTS)
 sd = noise_sd(drive.measurements, 20.0)
 assert sd[Y.suspension_rate_fl] == 0.01
-law = ParameterLaw(parameter="anti_roll", signal="suspension_rate_fl", scale=1.0)
+law = ParameterLaw(parameter="anti_roll", signal="suspension_rate_fl", scale=1.0, prior_sd=0.2,
+                   noise_density=1.0)
 gains = {("suspension_rate_fl", "suspension_rate_fl"): 1.0}
 observer = make("til", Given(vehicle=suv, laws=[law], gains=gains))
 observer.reset(20.0)
