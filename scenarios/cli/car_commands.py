@@ -1,4 +1,4 @@
-"""Commands of `til` for one's own car and tyres: new-car, new-tyre, fit-tyre."""
+"""Commands of `til` for one's own car and tyres: new-car, check-car, new-tyre, fit-tyre."""
 
 from pathlib import Path
 
@@ -56,6 +56,32 @@ def new_car(
     click.echo(f"{path} describes a car: change what you know of yours.")
 
 
+@click.command("check-car")
+@click.argument("car")
+@click.option(
+    "--png",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.png",
+    help="Draw it there.  [default: CAR.check.png in this folder]",
+)
+@click.option("--no-png", is_flag=True, help="Draw nothing.")
+def check_car(car: str, png: Path | None, no_png: bool) -> None:
+    """Measure, drive and draw a CAR: a name of models/, or a TOML or MJCF file.
+
+    Prints a line per check: the car's figure, the usual range with its source, and LOOK where the
+    figure lies outside. Checked are weights and heights at rest; ride, pitch and roll on the
+    springs; steady cornering and a step of the steering at 80 km/h; braking and acceleration. Takes
+    some seconds. An unusual car is no error: the exit status is 0 unless it cannot stand or drive.
+    """
+    check, picture = catalogue.car_check()
+    checked = check.check_car(car)
+    click.echo(f"{checked.vehicle.source.name}\n{check.as_text(checked)}")
+    if not no_png:
+        path = png or Path(f"{checked.vehicle.source.stem}.check.png")
+        picture.draw(checked, path)
+        click.echo(f"{path} shows it.")
+
+
 @click.command("new-tyre")
 @click.argument("size")
 @_load_index
@@ -99,4 +125,4 @@ def fit_tyre(data: tuple[Path, ...], out: Path, size: str | None, load_index: in
     click.echo(f"{out} describes the tyre; {picture} shows the fit over the data.")
 
 
-COMMANDS = (new_car, new_tyre, fit_tyre)
+COMMANDS = (new_car, check_car, new_tyre, fit_tyre)

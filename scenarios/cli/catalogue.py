@@ -136,6 +136,12 @@ def new_car() -> Any:
     return import_module("scenarios.calibration.new_car")
 
 
+def car_check() -> tuple[Any, Any]:
+    """The modules that check a car, and that draw what they found."""
+    package = "scenarios.car_check"
+    return import_module(f"{package}.check"), import_module(f"{package}.picture")
+
+
 def tyre_fit() -> Any:
     """The module that fits a tyre to measurements."""
     return import_module("scenarios.calibration.tyre_report")

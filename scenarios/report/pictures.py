@@ -25,18 +25,34 @@ def figure(path: Path, *, title: str, rows: int = 1, shared: bool = True) -> Ite
     Raises:
         TwinError: matplotlib is not installed.
     """
+    with canvas(path, title=title, size=(8.0, 2.0 + 2.5 * rows)) as sheet:
+        axes = sheet.subplots(rows, 1, sharex=shared)
+        for one in np.atleast_1d(axes):
+            one.grid(alpha=0.3)
+        yield axes
+
+
+@contextmanager
+def canvas(path: Path, *, title: str, size: tuple[float, float]) -> Iterator[Any]:
+    """An empty figure of matplotlib to lay out and draw on; saved as PNG when the block ends well.
+
+    Args:
+        path: of the picture.
+        title: above it.
+        size: width and height [inch].
+
+    Raises:
+        TwinError: matplotlib is not installed.
+    """
     try:
         from matplotlib.figure import Figure
     except ImportError:
         raise TwinError(
             f"{path.name}: pictures need matplotlib: pip install -e '.[plots]' in the project"
         ) from None
-    sheet = Figure(figsize=(8.0, 2.0 + 2.5 * rows), dpi=120, layout="constrained")
+    sheet = Figure(figsize=size, dpi=120, layout="constrained")
     sheet.suptitle(title)
-    axes = sheet.subplots(rows, 1, sharex=shared)
-    for one in np.atleast_1d(axes):
-        one.grid(alpha=0.3)
-    yield axes
+    yield sheet
     with replacing(path) as partial:
         sheet.savefig(partial, format="png")
 

@@ -9,6 +9,7 @@ import numpy as np
 
 import models
 from twin.car.fields import SECTIONS, Section
+from twin.car.inertia import check_inertia
 from twin.car.mjcf import tyre_path
 from twin.car.rules import Figures, derived, settled
 from twin.errors import TwinError
@@ -44,9 +45,10 @@ def car_spec(path: Path) -> mujoco.MjSpec:
     The chassis frame stands at the IMU. Springs are as long as it takes to stand level.
 
     Raises:
-        TwinError: as `read_car`.
+        TwinError: as `read_car`, or no body has such an inertia.
     """
     car = read_car(path)
+    check_inertia(path, car["chassis"])
     spec = mujoco.MjSpec.from_file(str(models.path("suv")))
     spec.modelname = path.stem
     _set_chassis(spec, car)

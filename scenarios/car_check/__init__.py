@@ -1,0 +1,1 @@
+"""`til check-car`: draws, measures and drives a car, and compares it with usual cars."""
