@@ -1,165 +1,106 @@
-"""Faults of sensors, injected at a third of the loaded SUV's drive through town."""
+"""Faults of a log, the balance of its forces, and the fault bench."""
 
 import numpy as np
 import pytest
 
-from estimators.til.default_observer import default_observer
-from scenarios.driving.manoeuvres import urban
+from scenarios.driving import joint_drives
 from scenarios.driving.record import record
-from twin import OUTPUTS, STATES, Twin, Vehicle, with_noise
+from scenarios.logs.estimate import estimate_of
+from scenarios.logs.findings import findings
+from scenarios.logs.force_balance import balances, contradictions, mass_of
+from scenarios.logs.signals import facts_of, signals_of
+from scenarios.papers import faults
+from scenarios.papers.reproduction import Making
+from scenarios.plants.faults import CHANNELS, FAULTS, with_fault
+from twin import Vehicle, with_noise
 
-VARIATION = 355.0
-FAULT = 20_000  # sample at which it begins
-AX, YAW_RATE = OUTPUTS.index("ax"), OUTPUTS.index("yaw_rate")
-WHEEL = OUTPUTS.index("wheel_speed_rl")
-
-
-@pytest.fixture(scope="module")
-def drive():
-    clean = record(Vehicle.load("suv_loaded"), urban(duration=60.0))
-    return with_noise(clean, 10.0, np.random.default_rng(11))
+SUV = Vehicle.load("suv")
 
 
 @pytest.fixture(scope="module")
-def observed(drive):
-    """Observes the drive with a fault; checks what holds under any fault."""
-
-    def observe(fault=lambda y: None):
-        y = drive.measurements.copy()
-        fault(y)
-        observer = default_observer(Vehicle.load("suv"), set(OUTPUTS)).observer
-        observer.reset(0.0)
-        estimate = observer.run(drive.replace(measurements=y))
-        assert np.isfinite(estimate.states).all()
-        assert np.isfinite(estimate.parameters).all()
-        assert np.abs(estimate["mass"]).max() < 900.0
-        assert np.abs(estimate["vx"] - drive.truth["vx"]).max() < 1.0
-        assert np.abs(estimate["vy"]).max() < 0.2
-        return estimate
-
-    return observe
+def log():
+    """A minute of the loaded SUV at 100 Hz, noisy."""
+    clean = record(Vehicle.load("suv_loaded"), joint_drives.mixed(duration=60.0))
+    return with_noise(clean, 20.0, np.random.default_rng(0)).replace(truth={})[::10]
 
 
-def recovers(estimate):
-    return abs(estimate["mass"][-1] - VARIATION) < 0.1 * VARIATION
+def said(log, channel, fault):
+    broken = with_fault(log, CHANNELS[channel], FAULTS[fault], np.random.default_rng(1))
+    return " ".join(map(str, findings(broken, SUV)))
 
 
-def flagged(estimate, first, last):
-    """Whether the flag is down from one sample to the other and up again two seconds after."""
-    flag = estimate.trustworthy
-    return not flag[first:last].any() and flag[last + 2000]
+def forces(drive):
+    car = facts_of(SUV)
+    return balances(signals_of(drive, car), car), car
 
 
-def held(column, seconds, value=None):
-    def fault(y):
-        part = slice(FAULT, FAULT + round(1e3 * seconds))
-        y[part, column] = y[FAULT, column] if value is None else value
-
-    return fault
-
-
-def test_drive_without_a_fault_is_trustworthy_but_for_its_start(observed):
-    estimate = observed()
-    assert recovers(estimate)
-    assert not estimate.trustworthy[:999].any()
-    assert estimate.trustworthy[1001:].all()
+def test_driving_braking_and_wheels_give_one_mass(log):
+    parts, car = forces(log)
+    assert not list(contradictions(parts, car.mass + car.spin_mass))
+    assert parts[0].drive.mean == pytest.approx(parts[0].brake.mean, rel=0.04)
+    assert mass_of(parts[0], car) == pytest.approx(car.mass + 355.0, rel=0.05)
 
 
-@pytest.mark.parametrize("value", [None, 2.5])
-def test_frozen_accelerometer_is_bridged(observed, value):
-    estimate = observed(held(AX, 5.0, value))
-    assert recovers(estimate)
-    assert flagged(estimate, FAULT + 1000, FAULT + 5000)
-    assert np.ptp(estimate["mass"][FAULT : FAULT + 5000]) < 0.15 * VARIATION
+def test_sound_log_has_no_finding(log):
+    assert findings(log, SUV) == []
 
 
-def test_stuck_wheel_speed_is_left_out_for_good(observed):
-    estimate = observed(held(WHEEL, 40.0))
-    assert recovers(estimate)
-    assert not estimate.trustworthy[FAULT + 1000 :].any()
+@pytest.mark.parametrize(
+    ("channel", "fault", "word"),
+    [
+        ("all brake torques", "times 0.8", "braking to one"),
+        ("all drive torques", "times 1.1", "driving belongs"),
+        ("one drive torque", "zero from a third on", "belong"),
+        ("ax", "times 1.1", "the change of the wheels' speed"),
+    ],
+)
+def test_what_contradicts_itself_is_found(log, channel, fault, word):
+    assert word.lower() in said(log, channel, fault).lower()
 
 
-def test_wheel_speed_stuck_at_zero_is_left_out_at_once(observed):
-    estimate = observed(held(WHEEL, 5.0, 0.0))
-    assert recovers(estimate)
-    assert flagged(estimate, FAULT, FAULT + 5000)
+def test_mass_that_no_force_explains_is_not_trusted(log):
+    """Noise of the drive torques pulls the observer's mass away from the balance of forces."""
+    rng = np.random.default_rng(1)
+    broken = with_fault(log, CHANNELS["all drive torques"], FAULTS["noisy"], rng)
+    found, _ = estimate_of(broken, SUV)
+    error = found.estimate["mass"][-1] - 355.0
+    assert not found.estimate.trustworthy[-1] or abs(error) < 1.96 * found.sd["mass"]
 
 
-def test_spike_of_50_g_leaves_no_trace(observed):
-    def spike(y):
-        y[FAULT : FAULT + 3, :3] = 50.0 * 9.81
-
-    estimate, without = observed(spike), observed()
-    assert flagged(estimate, FAULT, FAULT + 3)
-    np.testing.assert_allclose(estimate["mass"], without["mass"], atol=2.0)
-
-
-@pytest.mark.parametrize("missing", [np.nan, np.inf])
-def test_gap_of_two_seconds_is_bridged(observed, missing):
-    def gap(y):
-        y[FAULT : FAULT + 2000] = missing
-
-    estimate = observed(gap)
-    assert recovers(estimate)
-    assert flagged(estimate, FAULT, FAULT + 2000)
+@pytest.mark.parametrize("name", FAULTS)
+def test_every_fault_changes_its_channels_only(log, name):
+    rng = np.random.default_rng(2)
+    for names in (CHANNELS["yaw_rate"], CHANNELS["all brake torques"]):
+        broken = with_fault(log, names, FAULTS[name], rng)
+        changed = {
+            channel
+            for channel in (*log.input_names, *log.output_names)
+            if not np.array_equal(broken.channel(channel), log.channel(channel), equal_nan=True)
+        }
+        assert changed <= set(names)
+        assert changed or name == "without its negative half"
 
 
-def test_bursts_of_missing_values_are_bridged(observed):
-    def bursts(y):
-        rng = np.random.default_rng(3)
-        for start in rng.integers(FAULT, FAULT + 10_000, 20):
-            y[start : start + rng.integers(10, 300)] = np.nan
-
-    estimate = observed(bursts)
-    assert recovers(estimate)
-    assert not estimate.trustworthy[FAULT : FAULT + 10_000].all()
-
-
-@pytest.mark.parametrize("offset", [0.5, -0.5])
-def test_offset_that_begins_on_the_way_is_found_and_taken_off(observed, offset):
-    def shift(y):
-        y[FAULT:, AX] += offset
-
-    estimate = observed(shift)
-    assert recovers(estimate)
-    assert not estimate.trustworthy[FAULT : FAULT + 1000].all()
-    assert estimate.trustworthy[-1]
+def test_bench_counts_and_names_what_is_off(monkeypatch, tmp_path):
+    few = {"far off from a third on": FAULTS["far off from a third on"]}
+    monkeypatch.setattr(faults, "FAULTS", few)
+    monkeypatch.setattr(faults, "CHANNELS", {"yaw_rate": ("yaw_rate",)})
+    monkeypatch.setattr(faults, "RATES", (100, 200))
+    monkeypatch.setattr(faults, "SOUND_RATES", (100,))
+    result = faults.faults(Making(seeds=(0,), jobs=1, out=tmp_path, duration=8.0))
+    shares = [row for row in result.rows if row.metric in {"refused", "found", "right"}]
+    assert len(shares) == 3 * 2 * len(faults.CARS)
+    assert (tmp_path / "faults.png").exists()
 
 
-def test_offset_of_the_yaw_rate_leaves_the_mass_alone(observed):
-    def shift(y):
-        y[FAULT:, YAW_RATE] += 0.03
-
-    assert recovers(observed(shift))
-
-
-def test_delay_of_30_ms_is_bridged(observed):
-    def delay(y):
-        y[FAULT:] = y[FAULT - 30 : -30].copy()
-
-    assert recovers(observed(delay))
-
-
-def test_twin_that_is_wrong_does_not_lock_its_sensors_out(drive):
-    """At 5 m/s too much no wheel speed fits; the gates open, and the twin is brought back."""
-    observer = default_observer(Vehicle.load("suv"), set(OUTPUTS)).observer
-    observer.reset(5.0)
-    part = slice(0, 8000)
-    estimate = observer.run(
-        drive.replace(
-            time=drive.time[part], inputs=drive.inputs[part],
-            measurements=drive.measurements[part],
-            truth={name: values[part] for name, values in drive.truth.items()},
-        )
-    )  # fmt: skip
-    assert abs(estimate["vx"][-1] - drive.truth["vx"][7999]) < 0.1
-    assert estimate.trustworthy[-1]
-    assert len(STATES) == estimate.states.shape[1]
-
-
-def test_default_observer_of_any_car_weighs_the_whole_car():
-    for name in ("suv", "sports_car"):
-        vehicle = Vehicle.load(name)
-        observer = default_observer(vehicle, set(OUTPUTS)).observer
-        whole = Twin(vehicle).model.body_subtreemass[0]
-        assert observer._laws["scale"][0] == pytest.approx(whole)
+def test_wrong_answer_that_is_trusted_is_off():
+    off = faults.Outcome(1.0, "mass", -200.0, 20.0, 0.1)
+    right, found, refused = off._replace(off=""), off._replace(trusted=0.0, off=""), faults._REFUSED
+    assert [faults.SHADES[o.shade] for o in (off, right, found, refused)] == [
+        "trustworthy and off", "trustworthy and right", "not trustworthy", "refused"
+    ]  # fmt: skip
+    run = faults.Run(
+        car=faults.CARS[0], rate=100, channel="ax", fault="noisy", seed=0, duration=60.0
+    )
+    rows = faults._rows_of_faults("x", [run], [off])
+    assert (rows[-1].case, rows[-1].median) == ("x: ax, noisy", -200.0)

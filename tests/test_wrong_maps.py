@@ -47,7 +47,7 @@ SAID = {
     "ax late by 0.4 s": "[channels.ax] delay = 0.4",
     "ax late by 0.2 s": "[channels.ax] delay = 0.2",
     "yaw rate late by 0.2 s": "[channels.yaw_rate] delay = 0.2",
-    "wheel speeds late by 0.3 s": "wheel_speed_* are 0.29 s late",
+    "wheel speeds late by 0.3 s": "wheel_speed_* are 0.3",
     "torques late by 0.3 s": "drive_torque_*, brake_torque_* are 0.28 s late",
     "all inputs late by 0.3 s": "steering_wheel_angle, drive_torque_*, brake_torque_* are 0.2",
     "clock of the inputs 0.2 % slow": "come by another clock, 0.2",

@@ -58,6 +58,9 @@ REPRODUCTIONS = {
     "honesty": Entry(
         "scenarios.papers.honesty:honesty", "are the claims true on cars that are not the twin?"
     ),
+    "faults": Entry(
+        "scenarios.papers.faults:faults", "broken channels of a log: found, or trusted and off?"
+    ),
     "til-table-3": Entry(f"{_TABLES}:table_3", "load parameters of the empty and loaded car"),
     "til-table-4": Entry(f"{_TABLES}:table_4", "mass: noise, wrong CM"),
     "til-table-5": Entry(f"{_TABLES}:table_5", "roll and yaw inertia: noise, wrong mass, wrong CM"),

@@ -31,6 +31,11 @@ Array = NDArray[np.float64]
 LEAST_CORRELATION = 0.5
 SLOPES = (0.8, 1.25)
 LAGS = (-0.1, 0.1)  # [s]
+_GRIP = {"ax": 2.0, "ay": 4.0}  # [m/s2] below which tyres of any car hardly slip; chosen
+# The outer wheel is loaded and turns faster: what that adds to the slope of the wheels' difference,
+# for each (m/s)2 of speed; 0.0024 in the SUV, 0.0013 in a low car
+_LOADED_WHEELS = 0.004
+_GRIP_DRIVE = 0.8  # [m/s2] that an axle drives with
 _BEND = 0.06  # [1/m] of curvature, some 8 degrees of the road wheels
 _REAR_COMPLIANCE = 0.008  # [s2/m] of sideslip behind per lateral acceleration: 4.5 degrees per g
 _AX_SLOPES = (0.9, 1.25)  # gravity on the pitching body adds some 5 %
@@ -184,6 +189,28 @@ def _hardly_bent(signals: Signals) -> NDArray[np.bool_]:
     return np.abs(signals.known["yaw_rate"]) < _BEND * np.abs(signals.known["speed"])
 
 
+def _with_grip(signals: Signals, left: str, right: str, car: CarFacts | None) -> NDArray[np.bool_]:
+    """(N,) where two wheels roll: slip makes more of their difference than the bend, near limits.
+
+    Args:
+        signals: of the drive.
+        left: wheel speed of one axle.
+        right: the other one of it.
+        car: that drove, if it is known.
+    """
+    grip = np.ones(signals.time.size, dtype=np.bool_)
+    torques = [name.replace("wheel_speed", "drive_torque") for name in (left, right)]
+    if car is not None and signals.has(*torques):
+        drive = np.sum([signals.known[name] for name in torques], axis=0)
+        grip &= np.abs(drive) < _GRIP_DRIVE * car.mass * car.radius
+    for name, most in _GRIP.items():
+        if signals.has(name):
+            grip &= np.abs(signals.known[name]) < most
+    if not signals.has("ay") and signals.has("yaw_rate", "speed"):
+        grip &= np.abs(signals.known["yaw_rate"] * signals.known["speed"]) < _GRIP["ay"]
+    return grip
+
+
 def _speed_channels(speed: str) -> tuple[str, ...]:
     return WHEEL_SPEEDS if speed == "wheels" else (speed,)
 
@@ -267,17 +294,19 @@ def _of_steering(signals: Signals, speed: str, car: CarFacts | None) -> Iterator
             continue
         if np.array_equal(signals.known[left], signals.known[right]):
             continue  # one speed for all wheels
+        good = signals.where(left, right, "speed") & _with_grip(signals, left, right, car)
         difference = (signals.known[right] - signals.known[left]) * radius / track
+        most = 1.8 + _LOADED_WHEELS * float(np.mean(v[good] ** 2)) if good.any() else 1.8
         if signals.has("yaw_rate"):
             yield Equation(
                 name=f"{axle} wheels' difference ~ yaw_rate",
                 channels=(left, right, "yaw_rate"),
                 left=difference,
                 right=signals.known["yaw_rate"],
-                good=signals.where(left, right, "yaw_rate"),
+                good=good & signals.where("yaw_rate"),
                 least=0.03,
-                slopes=(0.4, 2.2),
-                lags=(-0.15, 0.15),
+                slopes=(0.4, most),
+                lags=(-0.25, 0.25),  # slip comes with the force, the yaw rate after it
                 alike=0.4,
             )
         elif turning is not None:
@@ -286,9 +315,9 @@ def _of_steering(signals: Signals, speed: str, car: CarFacts | None) -> Iterator
                 channels=(left, right, "steering_wheel_angle"),
                 left=difference,
                 right=turning,
-                good=signals.where(left, right, "steering_wheel_angle"),
+                good=good & signals.where("steering_wheel_angle"),
                 least=0.03 if car else 0.75,
-                slopes=(0.15, 2.2) if car else (1e-4, 0.2),
+                slopes=(0.15, most) if car else (1e-4, 0.2),
                 lags=(-0.1, 0.35),
                 alike=0.4,
             )

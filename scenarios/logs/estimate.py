@@ -22,7 +22,7 @@ from scenarios.logs.answer import Answer, answer, sideslip
 from scenarios.logs.answer_text import lines_of
 from scenarios.logs.estimators import ESTIMATORS, Found
 from scenarios.logs.findings import Finding, findings, hills
-from scenarios.logs.mass_interval import with_hills, with_torque_accuracy
+from scenarios.logs.mass_interval import unlike_forces, with_hills, with_torque_accuracy
 from scenarios.logs.pieces import lacking, measured, prepared
 from scenarios.logs.trust_spans import distrust_gaps
 from twin import Drive, TwinError, Vehicle
@@ -180,6 +180,22 @@ def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
     """What the estimator finds, and what was done before."""
     vehicle = Vehicle.load(task.vehicle)
     drive = Drive.load(task.log, task.map, signals_of(vehicle))
+    return estimate_of(drive, vehicle, task.estimator)
+
+
+def estimate_of(
+    drive: Drive, vehicle: Vehicle, estimator: str = "til"
+) -> tuple[Found, tuple[str, ...]]:
+    """What an estimator finds of a drive, its checks included; and what was done before.
+
+    Args:
+        drive: a log in our channels.
+        vehicle: of the twin.
+        estimator: of `ESTIMATORS`.
+
+    Raises:
+        TwinError: the drive lacks what the estimator needs, or the twin has blown up.
+    """
     log = prepared(drive, float(vehicle.compile().opt.timestep))
     told = tuple(drive.settings.get("log", {}).get("done", ()))
     if not told:
@@ -193,9 +209,10 @@ def _found(task: Task) -> tuple[Found, tuple[str, ...]]:
         )
     longest = max(log.pieces, key=len)
     wrong = findings(longest, vehicle)
-    found = with_hills(ESTIMATORS[task.estimator](vehicle, log), hills(longest, vehicle))
+    found = with_hills(ESTIMATORS[estimator](vehicle, log), hills(longest, vehicle))
     found = with_torque_accuracy(found, vehicle)
     found = found._replace(estimate=distrust_gaps(found.estimate, log.pieces[0]))
+    wrong += unlike_forces(found, longest, vehicle)
     return _with_findings(found, wrong), (*told, *log.done)
 
 

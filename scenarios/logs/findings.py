@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from scenarios.logs.checks import TORQUES, Check, checks_of, force_of
-from scenarios.logs.hypotheses import best, mended, shown, torque_shares
+from scenarios.logs.force_balance import balances, contradictions
+from scenarios.logs.hypotheses import best, mended, shown
 from scenarios.logs.signals import (
     BRAKE_TORQUES,
     DRIVE_TORQUES,
@@ -31,7 +32,14 @@ _LONGEST_LOG = 600.0  # [s] of a drive that are looked at, from its middle; chos
 _FROZEN = 1.0  # [s] without any change of a sensor in motion
 _OFFSETS = {"ax": 0.7, "ay": 0.7, "yaw_rate": 0.035, "steering_wheel_angle": 0.12}
 _FORCE_OFFSET = 0.55  # [m/s2] of the torques; a slope of 3 degrees
-_BRAKES = (0.7, 1.5)  # of the brakes' scale over the drive torques'
+_BALANCED = {
+    "torques": (*DRIVE_TORQUES, *BRAKE_TORQUES),
+    "ax": ("ax", *WHEEL_SPEEDS),
+}
+_MENDS = {
+    "torques": "[channels.drive_torque_*] or [channels.brake_torque_*] factor",
+    "ax": "[channels.ax] factor, or that of [channels.wheel_speed_*]",
+}
 _SLOWEST_RATE = 1.0  # [Hz] of a log
 _FASTEST_RATE = 20_000.0
 _LONGEST = 24.0 * 3600.0  # [s]
@@ -135,6 +143,8 @@ def _of_time(drive: Drive) -> Iterator[Finding]:
 def _frozen(drive: Drive, signals: Signals) -> Iterator[Finding]:
     """Sensors that stand still while the car moves."""
     moving = np.interp(drive.time, signals.time, signals.moving.astype(float)) > 0.5
+    if not moving.any():
+        return
     for name in drive.output_names:
         if name not in OUTPUTS:
             continue
@@ -145,7 +155,7 @@ def _frozen(drive: Drive, signals: Signals) -> Iterator[Finding]:
         else:
             edges = np.flatnonzero(np.diff(np.concatenate([[0], still.view(np.int8), [0]])))
             steps = int((edges[1::2] - edges[::2]).max()) if edges.size else 0
-        if steps * drive.dt >= _FROZEN and moving.any():
+        if steps * drive.dt >= _FROZEN:
             seconds = min(steps, int(still.sum())) * drive.dt
             yield Finding(
                 channels=(name,),
@@ -245,13 +255,9 @@ def _of_forces(
     good = signals.where("ax", "speed")
     ax = signals.known["ax"]
     mass = car.mass + car.spin_mass
-    shares = torque_shares(signals, car)
-    ratio = shares[0] / shares[1] if shares and shares[1] > 0.0 else 1.0
-    if not _BRAKES[0] <= ratio <= _BRAKES[1]:
+    for what, words in contradictions(balances(signals, car), mass):
         yield Finding(
-            channels=BRAKE_TORQUES,
-            words=f"The brake torques are {ratio:.2g} times what the drive torques let expect",
-            mend=f"[channels.brake_torque_*] factor = {1.0 / ratio:.2g}",
+            channels=_BALANCED[what], words=words[:1].upper() + words[1:], mend=_MENDS[what]
         )
     slow = round(_SMOOTH / signals.dt)
     by_torques = force / (mass * check.fit.slope) - ax

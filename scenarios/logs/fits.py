@@ -9,6 +9,7 @@ Array = NDArray[np.float64]
 
 LARGEST_LAG = 1.0  # [s] that is searched
 _LEAST_SECONDS = 3.0  # of a part whose lag is looked for
+_LEAST_COMMON = 0.6  # of the good samples that must remain good with a lag
 _PART = 12.0  # [s] of a drive, to see whether the lag drifts; at most so many of them:
 _MOST_PARTS = 12
 _LEAST_DRIFT = 0.08  # [s] over the drive
@@ -85,7 +86,7 @@ def _shifted(
 def _correlation(left: Array, right: Array, good: NDArray[np.bool_], steps: int) -> float:
     a, b, weights = _shifted(left, right, good, steps)
     a, b = a[weights], b[weights]
-    if a.size < 8:
+    if a.size < max(8.0, _LEAST_COMMON * float(good.sum())):
         return 0.0
     a, b = a - a.mean(), b - b.mean()
     return float(a @ b / max(np.sqrt((a @ a) * (b @ b)), 1e-300))

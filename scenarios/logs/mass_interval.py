@@ -1,16 +1,52 @@
-"""What the mass' standard deviation contains besides the noise: torques, and hills."""
+"""What the mass' standard deviation contains besides the noise, and whether it fits the forces."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from scenarios.logs.estimators import Found
-from twin import Vehicle
+from scenarios.logs.findings import Finding
+from scenarios.logs.force_balance import balances, mass_of
+from scenarios.logs.signals import facts_of, signals_of
+from twin import Drive, Vehicle
 
 _LEAST_HILL = 0.1  # [m/s2]; what is less is noise and pitching
 # Of the mass, for each m/s2 of hills: twice of what 12 drives of the SUV were off in sines of 1 to
 # 6 % and 25 to 60 s
 _HILLS = 0.07
+_UNLIKE = 0.05  # of the car's mass, by which the balance of forces may differ beside the interval
+_NORMAL_95 = 1.96  # standard deviations
+
+
+def unlike_forces(found: Found, drive: Drive, vehicle: Vehicle) -> list[Finding]:
+    """A finding if the mass is none that torques over the wheels' acceleration let expect.
+
+    The observer and the balance of forces weigh the same drive by other means: noise of a torque,
+    a lag or a scale of a_x moves them apart.
+
+    Args:
+        found: of an estimator.
+        drive: that it observed.
+        vehicle: of the twin.
+    """
+    if "mass" not in found.sd:
+        return []
+    car = facts_of(vehicle)
+    parts = balances(signals_of(drive.replace(truth={}), car), car)
+    expected = mass_of(parts[0], car) if parts else None
+    mass = car.mass + float(found.estimate["mass"][-1])
+    allowed = _UNLIKE * car.mass + _NORMAL_95 * found.sd["mass"]
+    if expected is None or abs(mass - expected) <= allowed:
+        return []
+    return [
+        Finding(
+            channels=("ax",),
+            words=(
+                f"The observer finds a car of {mass:.0f} kg, torques over the wheels' acceleration "
+                f"one of {expected:.0f} kg"
+            ),
+        )
+    ]
 
 
 def with_hills(found: Found, hill: float) -> Found:
