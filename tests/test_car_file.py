@@ -7,7 +7,7 @@ from cars import inputs, run, times
 import models
 from twin import Twin, TwinError, Vehicle
 from twin.car.fields import SECTIONS
-from twin.car.toml_car import template, write_template
+from twin.car.template import template, write_template
 from twin.tyre.magic_formula import magic_formula, relaxation_lengths, slip_stiffnesses
 
 FIELDS = [(section, field) for section in SECTIONS for field in section.fields]

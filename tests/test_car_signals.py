@@ -5,7 +5,7 @@ import pytest
 
 from twin import WHEELS, Drive, TwinError, Vehicle
 from twin.car.signals import signals_of
-from twin.car.toml_car import template
+from twin.car.template import template
 from twin.logs.car_signals import CarSignals
 from twin.logs.units import GRAVITY
 

@@ -9,7 +9,8 @@ from scenarios.__main__ import main
 from scenarios.car_check.check import RANGES, as_text, check_car
 from twin import TwinError
 from twin.car.rules import Figures
-from twin.car.toml_car import read_car, write_template
+from twin.car.template import write_template
+from twin.car.toml_car import read_car
 from twin.tyre.size import parse_size
 
 GOLF = Figures(

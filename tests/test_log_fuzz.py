@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from twin import Drive, TwinError, Vehicle
-from twin.car.toml_car import template
+from twin.car.template import template
 from twin.logs.formats import format_of
 from twin.logs.map import LogMap
 from twin.logs.raw_log import Wanted

@@ -7,7 +7,8 @@ from scenarios.__main__ import main
 from twin import Twin, TwinError, Vehicle
 from twin.car.guesses import ABSOLUTE, RELATIVE, car_guesses
 from twin.car.rules import Figures
-from twin.car.toml_car import read_car, write_template
+from twin.car.template import write_template
+from twin.car.toml_car import read_car
 from twin.tyre.interface import stiffness
 from twin.tyre.size import parse_size, tyre_text
 from twin.tyre.tir import read_tyre
@@ -77,6 +78,7 @@ def test_figures_are_known_and_rules_are_guesses(golf):
     names = {guess.name for guess in guesses}
     known = {"chassis.mass", "chassis.cm_to_front_axle", "geometry.wheelbase"}
     known |= {"geometry.track_front", "geometry.track_rear", "drivetrain.drive_front"}
+    known |= {"tyre.front.radius", "tyre.rear.radius"}
     assert len(guesses) == total - len(known)
     assert names.isdisjoint(known)
     assert {"chassis.Jzz", "suspension.front.stiffness", "steering.ratio"} <= names

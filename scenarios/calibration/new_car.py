@@ -4,7 +4,7 @@ from pathlib import Path
 
 from twin import TwinError
 from twin.car.rules import Figures
-from twin.car.toml_car import write_new, write_template
+from twin.car.template import write_new, write_template
 from twin.tyre.size import parse_size, tyre_text
 
 

@@ -13,7 +13,7 @@ from scenarios.calibration.tyre_data import TyreData, read_tyre_data
 from scenarios.calibration.tyre_fit import TyreFit, evaluate, fit_tyre, samples_of
 from scenarios.report.pictures import figure
 from twin import TwinError
-from twin.car.toml_car import write_new
+from twin.car.template import write_new
 from twin.tyre.files import read_tyre_file
 from twin.tyre.size import parse_size, tyre_text
 

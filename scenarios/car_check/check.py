@@ -1,7 +1,6 @@
 """Compares a car with usual cars: measured at rest, on its springs and driven."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from scenarios.car_check.drives import (
 )
 from scenarios.car_check.modes import Modes, modes_of
 from twin import TYRE, Twin, Vehicle
-from twin.car.guesses import car_guesses
+from twin.car.guesses import guesses_of
 
 
 class Range(NamedTuple):
@@ -149,8 +148,7 @@ def check_car(name: str) -> Checked:
         "braking by 0.4 g": pedals.braking,
         "0 to 100 km/h": pedals.hundred,
     }
-    source = Path(vehicle.source)
-    guesses, total = car_guesses(source) if source.suffix == ".toml" else ((), 0)
+    guesses, total = guesses_of(vehicle)
     return Checked(
         vehicle=vehicle,
         checks=tuple(Check(name, float(values[name])) for name in RANGES),

@@ -22,6 +22,7 @@ from scenarios.logs.answer import Answer, answer, sideslip
 from scenarios.logs.answer_text import lines_of
 from scenarios.logs.estimators import ESTIMATORS, Found
 from scenarios.logs.findings import Finding, findings, hills
+from scenarios.logs.guesses import with_guesses
 from scenarios.logs.mass_interval import unlike_forces, with_hills, with_torque_accuracy
 from scenarios.logs.pieces import lacking, measured, prepared
 from scenarios.logs.trust_spans import distrust_gaps
@@ -209,7 +210,11 @@ def estimate_of(
         )
     longest = max(log.pieces, key=len)
     wrong = findings(longest, vehicle)
-    found = with_hills(ESTIMATORS[estimator](vehicle, log), hills(longest, vehicle))
+    observe_by = ESTIMATORS[estimator]
+    found = observe_by(vehicle, log)
+    if estimator != "joint":  # whose prior has them
+        found = with_guesses(found, vehicle, lambda car: observe_by(car, log))
+    found = with_hills(found, hills(longest, vehicle))
     found = with_torque_accuracy(found, vehicle)
     found = found._replace(estimate=distrust_gaps(found.estimate, log.pieces[0]))
     wrong += unlike_forces(found, longest, vehicle)

@@ -17,6 +17,7 @@ from estimators.til.stream import rolling_radius
 from scenarios.logs.candidate import Candidate
 from scenarios.logs.follower import driven
 from scenarios.logs.free_parameters import FREE
+from scenarios.logs.guessed_priors import guessed_priors
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
 from scenarios.planning.advice import missing, what_to_drive
 from twin import LOAD, OUTPUTS, PARAMETER, SCALES, WHEELS, Drive, Twin, TwinError, Vehicle
@@ -139,13 +140,20 @@ def joint(vehicle: Vehicle, log: Prepared) -> Found:
     noise = np.where(
         [name in names for name in OUTPUTS], noise_of_record(piece.measurements), np.nan
     )
-    observer = JointObserver(vehicle, noise, JointSettings(parameters=REAL_CAR))
+    priors = guessed_priors(vehicle)
+    settings = JointSettings(parameters=REAL_CAR, prior_sd=priors)
+    observer = JointObserver(vehicle, noise, settings)
     observer.reset(start_speed(piece, rolling_radius(Observer(Twin(vehicle), []))))
     plain = piece.replace(measurements=piece.measurements[:, : len(OUTPUTS)], output_names=OUTPUTS)
     estimate = observer.run(plain)
     parameters = (*LOAD, *SCALES)
     sd = dict(zip(estimate.estimated, estimate.sd[-1].tolist(), strict=True))
     told = what_to_drive(missing(estimate))
+    if priors:
+        told = (
+            *told,
+            f"Wider before the drive, as the car's file holds guesses: {', '.join(priors)}.",
+        )
     return Found(piece, estimate, parameters, {name: sd[name] for name in parameters}, told)
 
 

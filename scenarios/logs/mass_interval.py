@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenarios.logs.estimators import Found
 from scenarios.logs.findings import Finding
 from scenarios.logs.force_balance import balances, mass_of
 from scenarios.logs.signals import facts_of, signals_of
 from twin import Drive, Vehicle
+
+Array = NDArray[np.float64]
 
 _LEAST_HILL = 0.1  # [m/s2]; what is less is noise and pitching
 # Of the mass, for each m/s2 of hills: twice of what 12 drives of the SUV were off in sines of 1 to
@@ -59,9 +62,8 @@ def with_hills(found: Found, hill: float) -> Found:
     if "mass" not in found.sd or hill < _LEAST_HILL:
         return found
     more = _HILLS * hill * float(found.estimate.absolute("mass")[-1])
-    return _widened(
-        found,
-        more,
+    return _told(
+        widened(found, more),
         f"Hills of {hill:.2g} m/s2, which the twin does not drive: the mass' standard deviation "
         f"contains {more:.3g} kg for them.",
     )
@@ -76,24 +78,31 @@ def with_torque_accuracy(found: Found, vehicle: Vehicle) -> Found:
     if "mass" not in found.sd or "drive_torque" in found.parameters or accuracy == 0.0:
         return found
     more = accuracy * (vehicle.figures.mass + float(found.estimate["mass"][-1]))
-    return _widened(
-        found,
-        more,
+    return _told(
+        widened(found, more),
         f"The torques are taken to be accurate to {100.0 * accuracy:.3g} % (torque_accuracy of the "
         f"car's file): the mass' standard deviation contains {more:.3g} kg for them.",
     )
 
 
-def _widened(found: Found, more: float, note: str) -> Found:
-    """With an independent error of the mass [kg], at the end and over time."""
+def widened(found: Found, more: float, over_time: Array | None = None) -> Found:
+    """With an independent error of the mass, at the end and over time.
+
+    Args:
+        found: of an estimator that gives the mass and its standard deviation.
+        more: standard deviation of that error at the end [kg].
+        over_time: (N,) the same at each sample; None: as at the end.
+    """
     estimate = found.estimate
     if estimate.sd is not None and "mass" in estimate.estimated:
         sd = estimate.sd.copy()
         column = estimate.estimated.index("mass")
-        sd[:, column] = np.hypot(sd[:, column], more)
+        sd[:, column] = np.hypot(sd[:, column], more if over_time is None else over_time)
         estimate = replace(estimate, sd=sd)
     return found._replace(
-        estimate=estimate,
-        sd=found.sd | {"mass": float(np.hypot(found.sd["mass"], more))},
-        done=(*found.done, note),
+        estimate=estimate, sd=found.sd | {"mass": float(np.hypot(found.sd["mass"], more))}
     )
+
+
+def _told(found: Found, note: str) -> Found:
+    return found._replace(done=(*found.done, note))

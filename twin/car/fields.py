@@ -151,3 +151,11 @@ SECTIONS = (
     ),
     Section("tyre.rear", (), _TYRE, optional=True),
 )
+
+BOUNDS = {
+    f"{section.name}.{field.name}": (field.least, field.largest)
+    for section in SECTIONS
+    for field in section.fields
+    if not isinstance(field.default, str)
+}
+"""Least and largest value of each field that is a number, by section and field."""

@@ -1,6 +1,6 @@
 """A vehicle: an MJCF or TOML file with its steering, aerodynamics, tyres and loads, checked."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,7 @@ import numpy as np
 import models
 from twin.car.calibrated import calibrated_of
 from twin.car.deltas import apply_deltas, check_deltas
+from twin.car.fields import BOUNDS
 from twin.car.figures import OPTIONAL, Figures, Grip, figures_of, grip_of, number
 from twin.car.geometry import check_geometry
 from twin.car.load import PointMass, RigidBody
@@ -45,6 +46,7 @@ class Vehicle:
         scales: what differs from the files by a factor, see `scaled`.
         deltas: what the chassis differs in from the files, see `changed`.
         calibration: what a calibration found beyond the car, by name: offsets of sensors, noises.
+        fields: what fields of a TOML file are, in place of what it says, see `with_fields`.
     """
 
     source: Path
@@ -52,6 +54,7 @@ class Vehicle:
     scales: tuple[tuple[str, float], ...] = ()
     deltas: tuple[tuple[str, float], ...] = ()
     calibration: tuple[tuple[str, float], ...] = ()
+    fields: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def load(cls, name: str | Path) -> "Vehicle":
@@ -111,6 +114,28 @@ class Vehicle:
         vehicle.compile()
         return vehicle
 
+    def with_fields(self, values: Mapping[str, float]) -> "Vehicle":
+        """The same car with other values of its TOML file's fields [SI].
+
+        Args:
+            values: by section and field, as "chassis.Jzz"; what is out of a field's range is taken
+                to its end.
+
+        Raises:
+            TwinError: the car is an MJCF file, a field is unknown or a value not finite, or no car
+                is so.
+        """
+        if self.source.suffix != ".toml":
+            raise TwinError(f"{self.source}: has no fields; allowed: a TOML file")
+        for name, value in values.items():
+            if name not in BOUNDS:
+                raise TwinError(f"{self.source}: has no field {name!r}")
+            if not np.isfinite(value):
+                raise TwinError(f"{self.source}: {name} is {value}; allowed: a finite number")
+        vehicle = replace(self, fields=tuple((dict(self.fields) | dict(values)).items()))
+        vehicle.compile()
+        return vehicle
+
     def spec(self) -> mujoco.MjSpec:
         """The car as an editable MJCF, loads attached.
 
@@ -122,7 +147,7 @@ class Vehicle:
                 f"{self.source}: no such vehicle file; give an MJCF or TOML file or a car's name"
             )
         is_toml = self.source.suffix == ".toml"
-        spec = car_spec(self.source) if is_toml else read_mjcf(self.source)
+        spec = car_spec(self.source, dict(self.fields)) if is_toml else read_mjcf(self.source)
         for load in self.loads:
             body = spec.body("chassis").add_body(name=load.name, pos=load.position)
             body.ipos = np.zeros(3)
@@ -204,7 +229,7 @@ class Vehicle:
             TwinError: a .tir file is missing or broken.
         """
         if self.source.suffix == ".toml":
-            read = car_tyres(self.source)
+            read = car_tyres(self.source, dict(self.fields))
         else:
             texts = _texts(self.compile(), "tyre_front", "tyre_rear")
             read = [read_tyre_file(tyre_path(self.source, name)) for name in texts]

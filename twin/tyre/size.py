@@ -13,6 +13,7 @@ NOMINAL_SHARE = 2.0 / 3.0  # nominal load over capacity; chosen: 4 kN for a 205/
 PRESSURE = 230_000.0  # [Pa], chosen: usual in passenger cars
 LOAD_INDICES = (50, 130)
 _SIZE = re.compile(r"(?:P|LT)?\s*(\d{3})\s*/\s*(\d{2})\s*Z?RF?\s*(\d{2})(?:\s+(\d{2,3})[A-Z()]*)?")
+NO_MEASUREMENT = "No measurement:"  # in the head of a tyre's file that was made from its size
 
 
 class TyreSize(NamedTuple):
@@ -105,7 +106,7 @@ def tyre_text(size: TyreSize, name: str) -> str:
         "PKY1": (-size.cornering_coefficient / rise, "largest cornering stiffness; chosen"),
     }
     head = [
-        f"$ {name}: load index {size.load_index}. No measurement: radius, loads and vertical",
+        f"$ {name}: load index {size.load_index}. {NO_MEASUREMENT} radius, loads and vertical",
         "$ stiffness follow from the size (see twin/tyre/size.py for the rules and their sources),",
         "$ all other coefficients are those of the project's tyres/suv.tir, which were chosen.",
         "$ Cornering stiffness is uncertain by some 25 %, friction by 15 %.",
