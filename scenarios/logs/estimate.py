@@ -28,6 +28,7 @@ from scenarios.logs.pieces import lacking, measured, prepared
 from scenarios.logs.trust_spans import distrust_gaps
 from twin import Drive, TwinError, Vehicle
 from twin.car.fingerprint import fingerprint
+from twin.car.guesses import guesses_of
 from twin.car.signals import signals_of
 from twin.logs.input_gaps import gaps_of, sentences
 from twin.logs.mapped_log import NEEDS
@@ -164,8 +165,10 @@ def fingerprint_of(task: Task) -> str:
     Raises:
         TwinError: a file cannot be read.
     """
-    content = hashlib.sha256(fingerprint(Vehicle.load(task.vehicle)).encode())
-    content.update(json.dumps([task.estimator, versions()]).encode())
+    vehicle = Vehicle.load(task.vehicle)
+    content = hashlib.sha256(fingerprint(vehicle).encode())
+    guesses = [guess.name for guess in guesses_of(vehicle)[0]]
+    content.update(json.dumps([task.estimator, versions(), guesses]).encode())
     for path in (task.log, task.map):
         if path is None:
             continue
