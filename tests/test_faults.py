@@ -5,12 +5,12 @@ import pytest
 
 from scenarios.driving import joint_drives
 from scenarios.driving.record import record
+from scenarios.experiment.reproduction import Making
 from scenarios.logs.estimate import estimate_of
 from scenarios.logs.findings import findings
 from scenarios.logs.force_balance import balances, contradictions, mass_of
 from scenarios.logs.signals import facts_of, signals_of
 from scenarios.papers import faults
-from scenarios.papers.reproduction import Making
 from scenarios.plants.faults import CHANNELS, FAULTS, with_fault
 from twin import Vehicle, with_noise
 

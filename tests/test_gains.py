@@ -2,9 +2,9 @@ import pytest
 
 from scenarios.__main__ import main
 from scenarios.experiment import gains_file as gains
+from scenarios.experiment.reproduction import Making
 from scenarios.experiment.sideslip_and_mass import BOUNDS, gains_of
 from scenarios.papers import til_tables
-from scenarios.papers.reproduction import Making
 from twin import TwinError
 
 GAINS, PREDICTED = {"a": 1.5, "b": 2.5}, {"a": 1.0, "b": 2.0}

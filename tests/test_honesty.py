@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from estimators.joint.noise import noise_of_record
+from scenarios.experiment.reproduction import Making
 from scenarios.papers import honesty
-from scenarios.papers.reproduction import Making
 from scenarios.plants.random_car import random_car
 from twin import OUTPUTS
 

@@ -8,8 +8,8 @@ import pytest
 
 from scenarios import __main__ as cli
 from scenarios.cli.catalogue import REPRODUCTIONS, Entry
+from scenarios.experiment.reproduction import Making
 from scenarios.experiment.result import Result, Row
-from scenarios.papers.reproduction import Making
 from scenarios.report.html import PictureOf, Section, write_report
 
 PNG = base64.b64decode(

@@ -9,6 +9,7 @@ from scenarios.cli.catalogue import REPRODUCTIONS, reproduction
 from scenarios.experiment import truck
 from scenarios.experiment.engine import estimate_on, observe, rows, runs
 from scenarios.experiment.experiment import Run, Trial
+from scenarios.experiment.reproduction import Making
 from scenarios.experiment.truck import (
     CASES,
     PAPER,
@@ -20,7 +21,6 @@ from scenarios.experiment.truck import (
     truck_case,
 )
 from scenarios.experiment.truck_plant import NOISE
-from scenarios.papers.reproduction import Making
 from scenarios.papers.truck_tables import ROBUSTNESS_CASES, robustness, table_2, tuning
 from twin import TwinError
 from twin.truck.model import RATES

@@ -418,7 +418,7 @@ class JointObserver:
             if self._state.evidence[FILLED] == 0 and self._state.evidence[USED] > 0:
                 self._weigh()
                 joint_kernel.claim(self._config, self._state, log, done - 1)
-        valid, reason = judge(log, self._config, self.settings)
+        valid, reason = judge(log, self._config, self.settings.valid_share)
         return JointEstimate(
             time=drive.time,
             states=log.states,

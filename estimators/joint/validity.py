@@ -1,7 +1,5 @@
 """Which estimates of the joint observer may be relied on, and why the others may not."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,9 +7,6 @@ from estimators.joint.evidence import SEGMENTS
 from estimators.joint.model_error import LEAST_SEGMENTS
 from estimators.joint.state import Configuration, Log
 from twin import PARAMETER, PARAMETERS
-
-if TYPE_CHECKING:
-    from estimators.joint.observer import JointSettings
 
 REASONS = (
     "",
@@ -26,14 +21,14 @@ _NEAR = 1e-3  # of a prior's standard deviation: so near to a bound is on it
 
 
 def judge(
-    log: Log, config: Configuration, settings: "JointSettings"
+    log: Log, config: Configuration, valid_share: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]:
     """Validity of every estimate at every sample.
 
     Args:
         log: of N samples.
         config: of the observer.
-        settings: of the observer.
+        valid_share: of its prior standard deviation, below which an estimate's has to be.
 
     Returns:
         (N, q) whether an estimate is valid, and (N, q) why not, as an index into `REASONS`.
@@ -50,7 +45,7 @@ def judge(
     )
     reason[:, :p][bound] = _BOUND
     reason[np.abs(values) > _FAR * prior] = _IMPLAUSIBLE
-    reason[log.sd >= settings.valid_share * prior] = _UNCERTAIN
+    reason[log.sd >= valid_share * prior] = _UNCERTAIN
     reason[log.segments < LEAST_SEGMENTS] = _EARLY
     return reason == 0, reason
 

@@ -10,6 +10,7 @@ import hashlib
 import math
 import os
 import time
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 from numpy.typing import NDArray
 
 import models
@@ -382,8 +384,6 @@ def _rows(task: Task, found: Fit) -> list[Row]:
 
 def write(path: Path, task: Task, logs: Sequence[Path], found: Fit) -> None:
     """Writes what was found, and from what, as TOML; whole or not at all."""
-    import tomli_w
-
     fixed = dict(task.candidate.values)
     content: dict[str, Any] = {
         "vehicle": _base(task.candidate.vehicle, path),
@@ -428,8 +428,6 @@ def read(path: Path) -> dict[str, float]:
     Raises:
         TwinError: the file is missing or no calibration.
     """
-    import tomllib
-
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
         values = {name: float(entry["value"]) for name, entry in content["values"].items()}

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scenarios.experiment.experiment import Experiment
+    from scenarios.experiment.reproduction import Making
     from scenarios.experiment.result import Result
-    from scenarios.papers.reproduction import Making
 
 ATTRIBUTE = "EXPERIMENT"  # what makes a module a scenario
 
@@ -118,7 +118,7 @@ _TARGETS = {
     "view": "scenarios.timeline.timeline:view",
     "picture": "scenarios.experiment.engine:draw",
     "gains": "scenarios.experiment.gains_file:of_run",
-    "making": "scenarios.papers.reproduction:Making",
+    "making": "scenarios.experiment.reproduction:Making",
     "cluster": "scenarios.experiment.progress:cluster",
     "bench": "scenarios.cli.bench:run",
 }

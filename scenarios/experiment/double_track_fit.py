@@ -11,7 +11,9 @@ import math
 import sys
 from pathlib import Path
 
+import mujoco
 import numpy as np
+import tomli_w
 from numpy.typing import NDArray
 
 import models
@@ -143,8 +145,6 @@ def _roll_share(drive: Drive, axle: int) -> float:
 
 def _yaw_inertia(twin: Twin) -> float:
     """Of the whole car about its vertical axis: an entry of MuJoCo's inertia matrix."""
-    import mujoco
-
     full = np.zeros((twin.model.nv, twin.model.nv))
     mujoco.mj_fullM(twin.model, twin.data, full)
     return float(full[5, 5])
@@ -165,8 +165,6 @@ def _curve(slip: Array, mu: Array, load: Array) -> MagicFormula:
 
 def write(name: str) -> Path:
     """Fits a car and writes its file."""
-    import tomli_w
-
     car = fit(name)
     content = {n: getattr(car, n) for n in DoubleTrack._fields[:5]}
     for axle in ("front", "rear"):

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 import models
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.result import replacing, versions
@@ -35,8 +37,6 @@ def write(
         predicted: the point predicted best.
         made: how it was made: evaluations, settings, seeds, the cost.
     """
-    import tomli_w
-
     content = {
         "vehicle": vehicle,
         "estimator": estimator,

@@ -26,6 +26,7 @@ from scenarios.logs.guesses import with_guesses
 from scenarios.logs.mass_interval import unlike_forces, with_hills, with_torque_accuracy
 from scenarios.logs.pieces import lacking, measured, prepared
 from scenarios.logs.trust_spans import distrust_gaps
+from scenarios.timeline.timeline import write_timeline
 from twin import Drive, TwinError, Vehicle
 from twin.car.fingerprint import fingerprint
 from twin.car.guesses import guesses_of
@@ -243,8 +244,6 @@ def _at_end(found: Found) -> bool | None:
 
 
 def _write_timeline(task: Task, found: Found) -> None:
-    from scenarios.timeline.timeline import write_timeline  # not at the top: it imports Rerun
-
     write_timeline(
         task.file(".rrd"),
         vehicle=Vehicle.load(task.vehicle),

@@ -11,6 +11,7 @@ from twin import Drive, Vehicle
 from twin.car.signals import signals_of
 from twin.logs.drive import NoDrive
 from twin.logs.formats import format_of
+from twin.logs.map import LogMap
 from twin.logs.raw_log import Channel, RawLog, Wanted
 from twin.logs.resampling import gaps
 from twin.logs.units import CHANNELS, our_unit
@@ -36,12 +37,9 @@ def inspect_log(path: Path, map_path: Path | None, vehicle: str | None = None) -
         return _channels(log) + (
             "\n\nNo checks: the log is of another program, and a map (--map) tells its channels."
         )
-    from twin.logs.map import LogMap
-    from twin.logs.mapped_log import drive_of
-
     log_map = LogMap.load(map_path)
     log = format_of(path).read_log(path, log_map.wanted)
-    drive = drive_of(log, log_map, signals_of(car) if car else None)
+    drive = Drive.of_log(log, log_map, signals_of(car) if car else None)
     done = "\n".join(f"  {line}" for line in drive.settings["log"]["done"])
     return f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive, car)}"
 

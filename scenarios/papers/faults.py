@@ -20,10 +20,10 @@ from scenarios.driving.drivers import driver_of, limits_of
 from scenarios.driving.manoeuvres import laps
 from scenarios.driving.record import record
 from scenarios.experiment.progress import parallel
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result, Row
 from scenarios.logs.answer import sideslip
 from scenarios.logs.estimate import estimate_of
-from scenarios.papers.reproduction import Clock, Making
 from scenarios.plants.faults import CHANNELS, FAULTS, with_fault
 from scenarios.report.pictures import canvas
 from twin import Drive, TwinError, Vehicle, with_noise

@@ -29,8 +29,8 @@ from scenarios.experiment.engine import runs, scores
 from scenarios.experiment.experiment import Case, Experiment, Recipe, Run, Score, Trial
 from scenarios.experiment.joint import REAL, TWIN
 from scenarios.experiment.metrics import true_deltas, unit_of_error
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result, Row
-from scenarios.papers.reproduction import Clock, Making
 from scenarios.plants.random_car import RealCar, properties, random_car
 from scenarios.plants.real_record import record_real
 from scenarios.plants.real_sensors import told

@@ -12,9 +12,9 @@ from scenarios.experiment import sideslip_and_mass
 from scenarios.experiment.engine import observe, rows, runs
 from scenarios.experiment.experiment import CarPlant, Run
 from scenarios.experiment.metrics import mass_error
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result, Row
 from scenarios.experiment.sideslip_and_mass import CASE, MISSING, TWIN
-from scenarios.papers.reproduction import Clock, Making
 from scenarios.report import pictures
 
 Drives = Literal["laps", "lane-change"]

@@ -12,8 +12,8 @@ from estimators.score import settling_time
 from scenarios import mass, pitch, roll_yaw
 from scenarios.experiment.engine import observe, rows, runs, scores
 from scenarios.experiment.experiment import CarPlant, Case, Experiment, Score, Trial
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result
-from scenarios.papers.reproduction import Clock, Making
 from scenarios.report import pictures
 from twin import Drive
 

@@ -15,9 +15,9 @@ from scenarios import mass, pitch, roll_yaw
 from scenarios.experiment import gains_file, joint, laws, sideslip_and_mass
 from scenarios.experiment.engine import rows, runs
 from scenarios.experiment.experiment import INFINITE, Case, Experiment, Recipe, Run
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result, Row
 from scenarios.experiment.sideslip_and_mass import BOUNDS, CASE, COMMONROAD, TABLE_8, TWIN
-from scenarios.papers.reproduction import Clock, Making
 from scenarios.plants.mismatch import MISMATCHES
 from scenarios.report.pictures import figure
 from twin import LOAD, Drive, Vehicle

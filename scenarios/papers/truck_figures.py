@@ -5,10 +5,10 @@ import numpy as np
 from scenarios.experiment import truck
 from scenarios.experiment.engine import observe, rows, runs
 from scenarios.experiment.experiment import Experiment, Score, Trial
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result
 from scenarios.experiment.truck import CASES, UNITS, estimate_of, settling_times, some
 from scenarios.experiment.truck_plant import LOAD_STEPS
-from scenarios.papers.reproduction import Clock, Making
 from scenarios.report import pictures
 from twin.truck.model import RATES
 from twin.truck.twin import TRUCK_PARAMETERS

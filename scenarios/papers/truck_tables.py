@@ -7,9 +7,9 @@ from estimators.benchmarks.kalman_bucy import KalmanBucySettings
 from scenarios.experiment import truck
 from scenarios.experiment.engine import rows, runs
 from scenarios.experiment.experiment import Case, Recipe
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result
 from scenarios.experiment.truck import CASES, RECIPES, TRUCK_PARAMETERS, UNITS, some, truck_case
-from scenarios.papers.reproduction import Clock, Making
 from twin.truck.parameters import STANDARD_GRAVITY
 
 ROBUSTNESS_CASES = (

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from estimators.joint.expected import EVERY, expected_sd
 from estimators.joint.observer import JointObserver
 from scenarios.experiment.progress import parallel
+from scenarios.experiment.reproduction import Clock, Making
 from scenarios.experiment.result import Result, Row
-from scenarios.papers.reproduction import Clock, Making
 from scenarios.planning.limits import PlanLimits
 from scenarios.planning.picture import draw
 from scenarios.planning.plan import NOISE, Option, Plan, Task, drawn, plan, told_by

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from scenarios.experiment.experiment import Gain
 from scenarios.experiment.progress import bar, parallel
@@ -103,8 +104,6 @@ def search(objective: Objective, evaluations: int, jobs: int, journal: Path) -> 
     Raises:
         TwinError: the journal belongs to another tuning.
     """
-    from threadpoolctl import threadpool_limits
-
     batches = -(-evaluations // BATCH)
     done = _read(journal, objective)[:batches]
     points: list[Point] = []

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from estimators.weigh.calibration import Calibration, losses_by_name
 from estimators.weigh.losses import TERMS
@@ -53,8 +54,6 @@ class Origin:
 
 def write_calibration(path: Path, calibration: Calibration, origin: Origin) -> None:
     """Writes the calibration and where it comes from."""
-    import tomli_w  # not at the top: only this writes TOML here
-
     scatter = calibration.scatter
     content: dict[str, Any] = {
         "origin": {

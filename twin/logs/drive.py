@@ -6,18 +6,20 @@ import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import TwinError
+from twin.logs.car_signals import CarSignals
 from twin.logs.formats import format_of
+from twin.logs.frames import columns_of, frame_of, log_of_frame
 from twin.logs.input_gaps import mended
+from twin.logs.map import LogMap
+from twin.logs.mapped_log import by_map, read_by_map
+from twin.logs.raw_log import RawLog
 from twin.toml_file import reason
-
-if TYPE_CHECKING:
-    from twin.logs.car_signals import CarSignals
 
 FORMAT_VERSION = 1
 # Samples count as uniform when no step differs by more than this from the mean one, relatively.
@@ -220,7 +222,7 @@ class Drive:
 
     @classmethod
     def load(
-        cls, path: str | Path, map: str | Path | None = None, car: "CarSignals | None" = None
+        cls, path: str | Path, map: str | Path | None = None, car: CarSignals | None = None
     ) -> "Drive":
         """Reads what `save` wrote, to the bit, or a log of anybody by its map.
 
@@ -237,9 +239,7 @@ class Drive:
         """
         path = Path(path)
         if map is not None:
-            from twin.logs.mapped_log import load_drive
-
-            return load_drive(path, map, car)
+            return cls(**read_by_map(path, map, car))
         columns, metadata = format_of(path).read_columns(path)
         if metadata is None:
             raise NoDrive(
@@ -250,6 +250,20 @@ class Drive:
             return cls(**mended(_sorted_out(columns), _settings(metadata)))
         except TwinError as error:
             raise TwinError(f"{path}: {error}") from error
+
+    @classmethod
+    def of_log(cls, log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> "Drive":
+        """A drive from a log that was read.
+
+        Args:
+            log: its channels.
+            log_map: what they are.
+            car: what the car makes of its signals.
+
+        Raises:
+            TwinError: they do not fit.
+        """
+        return cls(**by_map(log, log_map, car))
 
     @classmethod
     def from_frame(cls, frame: Any, map: "str | Path | Mapping[str, Any] | None" = None) -> "Drive":
@@ -264,14 +278,9 @@ class Drive:
         Raises:
             TwinError: the frame or the map is broken, or they do not fit.
         """
-        from twin.logs.frames import columns_of, log_of_frame
-
         if map is not None:
-            from twin.logs.map import LogMap
-            from twin.logs.mapped_log import drive_of
-
             log_map = LogMap.of(map) if isinstance(map, Mapping) else LogMap.load(map)
-            return drive_of(log_of_frame(frame, log_map.wanted.time), log_map)
+            return cls.of_log(log_of_frame(frame, log_map.wanted.time), log_map)
         columns, metadata = columns_of(frame)
         settings = _settings(metadata) if metadata else {}
         return cls(**mended(_sorted_out(columns), settings))
@@ -285,8 +294,6 @@ class Drive:
         Raises:
             TwinError: there is no such kind, or its library is not installed.
         """
-        from twin.logs.frames import frame_of
-
         metadata = json.dumps({"version": FORMAT_VERSION, "settings": self.settings})
         return frame_of(dict(self._columns()), metadata, kind)
 

@@ -1,8 +1,9 @@
-"""A log of anybody becomes a `Drive` by its map, and says what was done to it."""
+"""The channels of a `Drive` from a log of anybody, by its map; and what was done to it."""
 
 from collections.abc import Mapping, Set
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,6 @@ from twin.channels import FURTHER_OUTPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
 from twin.logs import can
 from twin.logs.car_signals import GIVES, CarSignals, derive
-from twin.logs.drive import Drive
 from twin.logs.formats import format_of
 from twin.logs.input_gaps import WithoutGaps, as_settings, runs, sentences, without_gaps
 from twin.logs.map import TORQUES, LogMap, Source, unit_in_si
@@ -36,8 +36,10 @@ NEEDS = {
 }
 
 
-def load_drive(path: str | Path, map_path: str | Path, car: CarSignals | None = None) -> Drive:
-    """A log as a drive.
+def read_by_map(
+    path: str | Path, map_path: str | Path, car: CarSignals | None = None
+) -> dict[str, Any]:
+    """The attributes of a drive, from a log.
 
     Inputs are those of `twin.INPUTS`, less the torques where the twin is to follow the speed.
     Measurements are `twin.OUTPUTS`, NaN where the log has none, and behind them what it has of
@@ -57,11 +59,11 @@ def load_drive(path: str | Path, map_path: str | Path, car: CarSignals | None = 
     log_map = LogMap.load(map_path)
     reader = can if log_map.database else format_of(path)
     log = reader.read_log(Path(path), log_map.wanted)
-    return drive_of(log, log_map, car)
+    return by_map(log, log_map, car)
 
 
-def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Drive:
-    """The drive of a log that was read; see `load_drive`."""
+def by_map(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> dict[str, Any]:
+    """The attributes of a drive, from a log that was read; see `read_by_map`."""
     ours = {name: _in_si(log, log_map, name, s) for name, s in log_map.channels.items()}
     truth = {name: _in_si(log, log_map, name, s) for name, s in log_map.truth.items()}
     grid = _grid(log, log_map, ours)
@@ -100,14 +102,14 @@ def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Dri
     measurements = np.column_stack([columns.get(name, missing) for name in names])
     measurements[inputs.bridged] = np.nan
     there = inputs.kept
-    return Drive(
-        time=grid[there],
-        inputs=np.column_stack([columns[name][there] for name in log_map.input_names]),
-        input_names=log_map.input_names,
-        measurements=measurements[there],
-        output_names=names,
-        truth={name: values[there] for name, values in kept.items()},
-        settings={
+    return {
+        "time": grid[there],
+        "inputs": np.column_stack([columns[name][there] for name in log_map.input_names]),
+        "input_names": log_map.input_names,
+        "measurements": measurements[there],
+        "output_names": names,
+        "truth": {name: values[there] for name, values in kept.items()},
+        "settings": {
             "log": {
                 "file": log.path.name,
                 "map": log_map.path.name,
@@ -118,7 +120,7 @@ def drive_of(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> Dri
                 "done": done,
             }
         },
-    )
+    }
 
 
 def _in_si(log: RawLog, log_map: LogMap, name: str, source: Source) -> Channel:
