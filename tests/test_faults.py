@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from scenarios.driving import joint_drives
+from scenarios.driving.drivers import driver_of, limits_of
+from scenarios.driving.manoeuvres import laps
 from scenarios.driving.record import record
 from scenarios.experiment.reproduction import Making
 from scenarios.logs.estimate import estimate_of
@@ -104,3 +106,35 @@ def test_wrong_answer_that_is_trusted_is_off():
     )
     rows = faults._rows_of_faults("x", [run], [off])
     assert (rows[-1].case, rows[-1].median) == ("x: ax, noisy", -200.0)
+
+
+@pytest.fixture(scope="module")
+def hard_laps():
+    """Half a minute of the sports car at its limits, at 1 kHz, noisy."""
+    car = Vehicle.load("sports_car")
+    manoeuvre = laps(duration=30.0, limits=limits_of(car))
+    clean = record(car, manoeuvre, driver_of(car))
+    return with_noise(clean, 20.0, np.random.default_rng(1)).replace(truth={})
+
+
+@pytest.mark.parametrize(
+    ("channel", "fault"),
+    [
+        ("wheel_speed_rl", "far off from a third on"),
+        ("wheel_speed_fl", "times 0.8"),
+        ("all wheel speeds", "frozen but for its last digit"),
+        ("yaw_rate", "times 1.5"),
+    ],
+)
+def test_broken_channel_is_found_near_the_limits(hard_laps, channel, fault):
+    car = Vehicle.load("sports_car")
+    log = hard_laps[::10]
+    assert findings(log, car) == []
+    broken = with_fault(log, CHANNELS[channel], FAULTS[fault], np.random.default_rng(1))
+    assert findings(broken, car)
+
+
+@pytest.mark.parametrize("rate", [50, 100, 1000])
+def test_sound_log_is_trusted_at_every_rate(hard_laps, rate):
+    found, _ = estimate_of(hard_laps[:: 1000 // rate], Vehicle.load("sports_car"))
+    assert np.mean(found.estimate.trustworthy) > 0.95

@@ -15,12 +15,12 @@ def noise_of_record(measurements: Array) -> Array:
     median resists the rest. Not less than what no sensor is better than (`twin.CHANNEL`).
 
     Args:
-        measurements: (N, 10) in the order of `twin.OUTPUTS`; NaN where there is none.
+        measurements: (N, k) of the first k of `twin.OUTPUTS`; NaN where there is none.
 
     Returns:
-        (10,) standard deviations.
+        (k,) standard deviations.
     """
     bends = np.abs(np.diff(measurements[:, : len(OUTPUTS)], n=2, axis=0))
     bends = np.where(np.isfinite(bends), bends, 0.0)
-    least = [CHANNEL[name].noise_floor for name in OUTPUTS]
+    least = [CHANNEL[name].noise_floor for name in OUTPUTS[: bends.shape[1]]]
     return np.maximum(1.4826 * np.median(bends, axis=0) / np.sqrt(6.0), least)

@@ -45,6 +45,7 @@ def default_observer(
     measured: Set[str],
     *,
     mass: bool = True,
+    ax_noise: float = NOISE_DENSITY,
 ) -> Default:
     """The guarded observer of a vehicle whose log measures these outputs.
 
@@ -52,6 +53,7 @@ def default_observer(
         vehicle: of the twin.
         measured: names of what the log measures.
         mass: whether the log's torques and accelerations can tell it.
+        ax_noise: density of the noise of a_x, if the log tells [m/s2 over root of Hz].
 
     Raises:
         TwinError: the vehicle's files are missing or broken.
@@ -68,7 +70,7 @@ def default_observer(
     gains = {pair: gain for pair, gain in wanted.items() if pair[1] in measured}
     missing = [of for _, of in wanted if of not in measured]
     left_out = [f"Without {name} the twin is not corrected by it." for name in missing]
-    laws = [mass_law(twin, radius, measured)] if mass else []
+    laws = [mass_law(twin, radius, measured, ax_noise)] if mass else []
     return Default(
         observer=Observer(twin, laws, gains, guarded=True),
         rolling_radius=radius,
@@ -96,8 +98,17 @@ def til_observer(car: str | Path | Vehicle, measured: Set[str] = frozenset(OUTPU
     return default_observer(vehicle, measured, mass="ax" in measured).observer
 
 
-def mass_law(twin: Twin, radius: float, measured: Set[str]) -> ParameterLaw:
-    """The law of the mass for a car, whose wheels roll at a radius [m]."""
+def mass_law(
+    twin: Twin, radius: float, measured: Set[str], ax_noise: float = NOISE_DENSITY
+) -> ParameterLaw:
+    """The law of the mass for a car.
+
+    Args:
+        twin: of the car.
+        radius: at which its wheels roll [m].
+        measured: names of what the log measures.
+        ax_noise: density of the noise of a_x [m/s2 over root of Hz]; never less than an IMU has.
+    """
     car = twin.car
     mass = float(car.nominal[0] + car.other_mass[0])
     wheels = any(f"wheel_speed_{wheel}" in measured for wheel in WHEELS)
@@ -107,7 +118,7 @@ def mass_law(twin: Twin, radius: float, measured: Set[str]) -> ParameterLaw:
         signal="ax",
         scale=mass,
         prior_sd=PRIOR_SD * mass,
-        noise_density=NOISE_DENSITY,
+        noise_density=max(ax_noise, NOISE_DENSITY),
         drift=DRIFT,
         offset_sd=OFFSET_SD,
         offset_jump=OFFSET_SD,

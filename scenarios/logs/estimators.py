@@ -78,7 +78,9 @@ def _scheduled(vehicle: Vehicle, log: Prepared) -> Found:
 
 def _with_mass(vehicle: Vehicle, log: Prepared) -> Found:
     names = measured(log.pieces)
-    default = default_observer(vehicle, names, mass=not lacking("mass", names))
+    default = default_observer(
+        vehicle, names, mass=not lacking("mass", names), ax_noise=log.ax_noise
+    )
     estimates = []
     for piece in log.pieces:
         speed = start_speed(piece, default.rolling_radius)

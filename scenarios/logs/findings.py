@@ -14,6 +14,7 @@ from scipy.ndimage import uniform_filter1d
 from scenarios.logs.checks import TORQUES, Check, checks_of, force_of
 from scenarios.logs.force_balance import balances, contradictions
 from scenarios.logs.hypotheses import best, mended, shown
+from scenarios.logs.kinematic_balance import mismatches
 from scenarios.logs.signals import (
     BRAKE_TORQUES,
     DRIVE_TORQUES,
@@ -86,6 +87,10 @@ def findings(drive: Drive, vehicle: Vehicle | None = None) -> list[Finding]:
     checked = checks_of(signals, car)
     found += _of_checks(signals, car, checked)
     if not any(finding.severity == "fault" for finding in found):
+        found += [
+            Finding(channels=wrong.channels, words=wrong.words[:1].upper() + wrong.words[1:])
+            for wrong in mismatches(signals, car)
+        ]
         found += _offsets(signals, car, checked)
         if car is not None:
             known = any("ax" in finding.channels for finding in found)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.joint.noise import noise_of_record
 from estimators.speed_follower import TORQUES
 from estimators.til.stream import FASTEST, LONGEST_GAP, LONGEST_STEP
 from twin import INPUTS, OUTPUTS, WHEELS, Drive, TwinError
@@ -29,11 +30,14 @@ class Prepared(NamedTuple):
             with vx behind them, where it is measured; a long gap lies between two.
         done: sentences that say what was done.
         follows: whether the twin has to follow the speed, for want of torques.
+        ax_noise: density of the white noise of a_x, by the log's own samples [m/s2 over root of
+            Hz]; 0 without a_x.
     """
 
     pieces: tuple[Drive, ...]
     done: tuple[str, ...]
     follows: bool
+    ax_noise: float = 0.0
 
 
 def prepared(drive: Drive, dt: float) -> Prepared:
@@ -52,7 +56,15 @@ def prepared(drive: Drive, dt: float) -> Prepared:
         done.append("What comes before the first measured speed is left out.")
     if follows:
         done.append("There are no torques: the twin follows vx, and the mass cannot be seen.")
-    return Prepared(tuple(started), tuple(done), follows)
+    return Prepared(tuple(started), tuple(done), follows, _ax_noise(drive))
+
+
+def _ax_noise(drive: Drive) -> float:
+    """Of samples as they come: what is interpolated between them looks less noisy than it is."""
+    if "ax" not in drive.output_names:
+        return 0.0
+    step = float(np.median(np.diff(drive.time)))
+    return float(noise_of_record(drive.channel("ax")[:, None])[0]) * float(np.sqrt(step))
 
 
 def longest_stretch(drive: Drive) -> Drive:
