@@ -78,6 +78,9 @@ REPRODUCTIONS = {
     "til-figure-10": Entry(f"{_FIGURES}:figure_10", "pitch inertia error over noise"),
     "til-figure-11": Entry(f"{_FIGURES}:figure_11", "pitch inertia error over the road's noise"),
     "til-table-8": Entry(f"{_TABLES}:table_8", "gains of the observers of sideslip and mass"),
+    "til-reduction": Entry(
+        "scenarios.reduction.study:reduction", "which entries of K matter: hand-chosen or automatic"
+    ),
     "til-figure-14": Entry(f"{_STATES}:figure_14", "what the car does on the laps"),
     "til-figure-15": Entry(f"{_STATES}:figure_15", "what the car does in the lane changes"),
     "til-figure-16": Entry(f"{_STATES}:figure_16", "mass and sideslip on the laps"),

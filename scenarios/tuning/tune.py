@@ -41,6 +41,7 @@ class Objective:
         metric, unit: of the cost.
         worst: what such gains cost; no finite cost counts for more.
         method: of `methods.METHODS`.
+        first: points before the first surrogate, today's among them; at most 16.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Objective:
     unit: str
     worst: float
     method: str = "bayes"
+    first: int = SOBOL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +113,7 @@ def search(objective: Objective, evaluations: int, jobs: int, journal: Path) -> 
     cost = _Cost(objective.cost, tuple(gain.name for gain in objective.gains))
     with threadpool_limits(1), bar(f"tune {objective.name}", batches * BATCH) as shown:
         # five times quicker here than with two threads
-        optimizer = method_of(objective.method, _box(objective), SOBOL)
+        optimizer = method_of(objective.method, _box(objective), objective.first)
         first = _first_points(objective)
         for k in range(batches):
             asked = first[BATCH * k : BATCH * (k + 1)] or optimizer.ask(BATCH, strategy="cl_min")
@@ -177,7 +179,7 @@ def _first_points(objective: Objective) -> list[Point]:
     # 2^4 of them, as Sobol wants a power of two; what is too many is left
     sobol = qmc.Sobol(len(box), seed=0)  # pyright: ignore[reportCallIssue]  # rng from scipy 1.15
     spread = qmc.scale(sobol.random_base2(4), *np.transpose(box))
-    return [today, *(tuple(point) for point in spread[: SOBOL - 1].tolist())]
+    return [today, *(tuple(point) for point in spread[: objective.first - 1].tolist())]
 
 
 def _predicted_best(

@@ -1,0 +1,1 @@
+"""A reduced K without a choice by hand: from how an ensemble of plausible cars errs."""
