@@ -68,6 +68,13 @@ class BlackBox(Protocol):
         ...
 
 
+def nominal_of(twin: BlackBox) -> Array:
+    """(np,) its parameters without deltas, as its attribute `nominal` says; NaN if it has none."""
+    told = getattr(twin, "nominal", None)
+    size = len(twin.parameters)
+    return np.full(size, np.nan) if told is None else np.array(told, dtype=np.float64)
+
+
 def settle(twin: BlackBox, speed: float, road: ArrayLike | None = None) -> None:
     """Settles a twin.
 

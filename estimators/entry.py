@@ -69,6 +69,14 @@ class Given:
             raise TwinError("estimator: has no twin; allowed: with a vehicle or a black box")
         return Twin(self.vehicle)
 
+    def source(self) -> Vehicle | Callable[[], BlackBox]:
+        """What the twins of an estimator that runs several are made of.
+
+        Raises:
+            TwinError: there is neither a vehicle nor a black box.
+        """
+        return self.car() if self.black_box is None else self.black_box
+
     def car(self) -> Vehicle:
         """The vehicle of the twins.
 

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from estimators.ensemble.stepping import correct, is_sound, read_states, step
 from twin import OUTPUTS, SPINS, STATES, WHEEL_ANGLES, WHEEL_SPEEDS, X
-from twin.kernel import correct, read_states, step
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -51,8 +51,8 @@ def advance(cars, block, size, u, y):
         block.mean[:] = 0.0
         block.measured[:] = 0.0
         block.number[:] = 0.0
+    step_all(cars, u, block.out)
     for i in range(cars.size):
-        step(cars[i], u, block.out[i])
         for j in range(NY):
             block.mean[i, j] += block.out[i, j]
     for j in range(NY):
@@ -110,24 +110,50 @@ def move_states(car, dx, roll):
 
 
 @njit(cache=True, nogil=True)
-def follow_speed(cars, block, share):
+def follow_speed(cars, means, measured, number, share, least_spin):
     """Draws each car's speed by a share to the measured wheel speeds.
 
     Speed and wheels change alike, so that no tyre slips by it: the accelerometers do not see it,
-    and what they tell of the mass remains.
+    and their information on the mass remains.
+
+    Args:
+        cars: of the ensemble.
+        means: (n, ny) of the cars' outputs over a block.
+        measured: (ny,) means of the measurements.
+        number: (ny,) of measurements.
+        share: of the difference; zero: none is followed.
+        least_spin: of a car that moves [rad/s].
     """
-    x, dx = np.empty(NX), np.zeros(NX)
+    if share == 0.0:
+        return
+    x, dx = np.zeros(NX), np.zeros(NX)
     for i in range(cars.size):
         late, spin, n = 0.0, 0.0, 0
         for j in range(FIRST_WHEEL, AFTER_WHEELS):
-            if block.number[j] > 0.0:
-                late += block.measured[j] - block.mean[i, j]
-                spin += block.mean[i, j]
+            if number[j] > 0.0:
+                late += measured[j] - means[i, j]
+                spin += means[i, j]
                 n += 1
-        if n == 0 or spin < n * LEAST_SPIN:
+        if n == 0 or spin < n * least_spin:
             continue
         read_states(cars[i], x)
         dx[VX] = share * late / spin * x[VX]
         for k in range(FIRST_SPIN, AFTER_SPINS):
             dx[k] = share * late / spin * x[k]
         correct(cars[i], dx)
+
+
+@njit(cache=True, nogil=True)
+def are_sound(cars):
+    """Whether none of the cars has blown up."""
+    sound = True
+    for i in range(cars.size):
+        sound = sound and is_sound(cars[i])
+    return sound
+
+
+@njit(cache=True, nogil=True)
+def step_all(cars, u, out):
+    """Steps all cars under inputs u (nu,); fills their outputs (n, ny) before it."""
+    for i in range(cars.size):
+        step(cars[i], u, out[i])

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators.base import Estimate
+from estimators.ensemble.twins import Source, parameters_of
 from estimators.ensemble.unscented import BIAS_SD
 from estimators.entry import Entry, Given
 from estimators.priors import initial_deltas, prior_sds
 from estimators.til.observer import Observer
-from twin import LOAD, OUTPUTS, PARAMETER, PARAMETERS, SCALES, Drive, Twin, TwinError, Vehicle
+from twin import IMU, LOAD, OUTPUTS, PARAMETER, SCALES, Drive, Twin, TwinError, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ class OfflineFit:
     """Fits parameters of a twin to a whole drive.
 
     Args:
-        vehicle: of the twin.
+        source: of the twin: a vehicle, or what makes a black box.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
         parameters: of `twin.PARAMETERS`, p of them; the others stay as they are at the start.
         prior_sd: by parameter, instead of that of its record.
@@ -50,21 +51,25 @@ class OfflineFit:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        source: Source,
         noise_sd: ArrayLike,
         parameters: Sequence[str] = (*LOAD, *SCALES),
         prior_sd: Mapping[str, float] | None = None,
     ) -> None:
-        unknown = [name for name in parameters if name not in PARAMETERS]
+        twin = Twin(source) if isinstance(source, Vehicle) else source()
+        unknown = [name for name in parameters if name not in twin.parameters]
         if unknown:
             raise TwinError(
-                f"fit: parameter {unknown[0]!r} is unknown; allowed: {', '.join(PARAMETERS)}"
+                f"fit: parameter {unknown[0]!r} is unknown; allowed: {', '.join(twin.parameters)}"
             )
         self.estimated = tuple(parameters)
         prior = prior_sds(parameters, prior_sd)
         self._scale = np.array([*(prior[name] for name in parameters), *BIAS_SD])
-        self._noise_sd = _checked_noise(np.asarray(noise_sd, dtype=np.float64))
-        self._observer = Observer(Twin(vehicle), [])
+        by_channel = dict(
+            zip(OUTPUTS, _checked_noise(np.asarray(noise_sd, np.float64)), strict=True)
+        )
+        self._noise_sd = np.array([by_channel.get(name, np.nan) for name in twin.outputs])
+        self._observer = Observer(twin, [])
 
     @property
     def dt(self) -> float:
@@ -78,7 +83,7 @@ class OfflineFit:
         road: ArrayLike | None = None,
     ) -> None:
         """See `estimators.base.Estimator`; the fit starts at these parameters."""
-        initial_deltas(parameters)  # checks the names
+        initial_deltas(parameters, self._observer.twin.parameters)  # checks the names
         self._start = _Start(speed, dict(parameters or {}), road)
 
     def run(self, drive: Drive) -> Estimate:
@@ -143,6 +148,9 @@ class _Problem:
         self._parameters, self._start, self._scale = parameters, start, scale
         self._centre = np.array([start.parameters.get(name, 0.0) for name in parameters])
         self._last: tuple[Array, Estimate] | None = None
+        # (6, ny) which output each of the IMU's biases enters
+        outputs = observer.twin.outputs
+        self._biased = np.array([np.isin(outputs, name) for name in OUTPUTS[IMU]], dtype=np.float64)
 
     def _simulate(self, theta: Array) -> Estimate:
         """The open-loop twin over the drive, with parameters theta (p,)."""
@@ -165,7 +173,7 @@ class _Problem:
         """(m + q,) of the m outputs, and of the prior."""
         biases = (x * self._scale)[len(self._parameters) :]
         found = _block_means(self.run(x).outputs)
-        found[:, : biases.size] += biases
+        found += biases @ self._biased
         return np.append(((found - self._measured.mean) * self._measured.weight).ravel(), x)
 
     def jacobian(self, x: Array) -> Array:
@@ -177,8 +185,7 @@ class _Problem:
             step = PARAMETER[name].step
             beside[i] += step
             columns.append((_block_means(self._simulate(beside).outputs) - middle) / step)
-        biased = np.eye(len(OUTPUTS))[: x.size - theta.size]
-        columns += [np.broadcast_to(row, middle.shape) for row in biased]
+        columns += [np.broadcast_to(row, middle.shape) for row in self._biased]
         pairs = zip(columns, self._scale, strict=True)
         stacked = [(column * self._measured.weight * s).ravel() for column, s in pairs]
         return np.vstack([np.column_stack(stacked), np.eye(x.size)])
@@ -195,7 +202,7 @@ def _checked_noise(sd: Array) -> Array:
 
 def _measured(drive: Drive, sd: Array) -> _Measured:
     # A block lacks a channel as soon as one of its samples does: its mean would not be the twin's
-    mean = _block_means(drive.measurements)
+    mean = _block_means(drive.measurements[:, : sd.size])
     weight = np.sqrt(BLOCK) / sd
     return _Measured(np.nan_to_num(mean), np.nan_to_num(np.where(np.isnan(mean), 0.0, weight)))
 
@@ -207,8 +214,9 @@ def _block_means(values: Array) -> Array:
 
 
 def _make(given: Given) -> OfflineFit:
-    parameters = given.parameters or (*LOAD, *SCALES)
-    return OfflineFit(given.car(), given.noise(OUTPUTS), parameters, given.prior_sd)
+    source = given.source()
+    parameters = given.parameters or parameters_of(source, (*LOAD, *SCALES))
+    return OfflineFit(source, given.noise(OUTPUTS), parameters, given.prior_sd)
 
 
 ENTRY = Entry(

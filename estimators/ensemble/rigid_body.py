@@ -54,10 +54,14 @@ def project(z, covariance, index, nominal, theta):
         z: (q,) estimates, changed in place; the first p are parameters, others come after.
         covariance: (q, q) of z.
         index: (p,) of each parameter in theta.
-        nominal: (np,) the unloaded body.
+        nominal: (np,) the unloaded body; with a NaN nothing is known of it, and nothing moves.
         theta: (np,) all parameters; those of index receive z.
     """
     p = index.size
+    for i in range(p):
+        theta[index[i]] = z[i]
+    if not np.isfinite(nominal[MASS : INERTIA + 6].sum()):
+        return
     column = np.zeros(z.size)
     least_moment = LEAST_SHARE * min(nominal[4], min(nominal[5], nominal[6]))
     for _ in range(ROUNDS):

@@ -18,17 +18,17 @@ repaired in a later one: that is what joint estimation is for.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators.base import Estimate
-from estimators.black_box import settle
 from estimators.ensemble import staged_kernel
 from estimators.ensemble.blocks import new_block
 from estimators.ensemble.staged_kernel import Log, Memory, Setup
+from estimators.ensemble.twins import EXTENDED_SHAPE, Source, Twins, parameters_of
 from estimators.ensemble.unscented import BIAS_SD, BLOCK, SPEED_GAIN, STEP
 from estimators.entry import Entry, Given
 from estimators.priors import initial_deltas
@@ -39,10 +39,7 @@ from twin import (
     PARAMETERS,
     STATES,
     Drive,
-    Ensemble,
     TwinError,
-    Vehicle,
-    check_inputs,
 )
 
 Array = NDArray[np.float64]
@@ -52,6 +49,7 @@ QUASI_STATIC = ("ax", "ay", "roll_rate", "pitch_rate", "yaw_rate")
 PRIOR = np.array([*(PARAMETER[name].prior_sd for name in CM), *BIAS_SD])
 # Of the yaw rate's low pass [s]; chosen: passes a driver's steering, leaves a tenth of the noise
 YAW_FILTER = 0.1
+_NONE = 1e-9  # s, of a stage that has nothing to estimate
 LEAST_WHEEL_SPEED = 3.0  # rad/s, 1 m/s, as in the mass law
 
 
@@ -106,9 +104,9 @@ class StagedObserver:
     """Estimates mass, pitch inertia, centre of mass, roll and yaw inertia one after the other.
 
     Args:
-        vehicle: of the twins.
+        source: of the twins: a vehicle, or what makes a black box, called once for each.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
-        laws: one each of mass, Jyy, Jxx and Jzz.
+        laws: one each of mass, Jyy, Jxx and Jzz, as far as the twins have them.
         settings: when which stage runs.
 
     Raises:
@@ -117,23 +115,28 @@ class StagedObserver:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        source: Source,
         noise_sd: ArrayLike,
         laws: Sequence[ParameterLaw],
         settings: StagedSettings = StagedSettings(),
     ) -> None:
         named = tuple(law.parameter for law in laws)
-        if sorted(named) != ["Jxx", "Jyy", "Jzz", "mass"]:
+        self.ensemble = Twins(source, 1 + len(CM))
+        own = self.ensemble.parameters
+        if sorted(named) != [name for name in ("Jxx", "Jyy", "Jzz", "mass") if name in own]:
             raise TwinError(f"staged: laws are of {', '.join(named)}; allowed: mass, Jxx, Jyy, Jzz")
-        self.estimated = (*named, *CM)
-        self.ensemble = Ensemble(vehicle, 1 + len(CM))
-        self._setup = _setup(settings, np.asarray(noise_sd, dtype=np.float64), self.dt)
+        # of a black box whose CM cannot be moved, none is estimated
+        self.estimated = (*named, *(CM if set(CM) <= set(own) else ()))
+        if self.estimated == named:
+            settings = replace(settings, cm_seconds=_NONE)
+        noise = self.ensemble.used(noise_sd, "staged")
+        self._setup = _setup(settings, noise, self.dt)
         self._laws = compile_laws(laws, self.dt)
 
     @property
     def dt(self) -> float:
         """Sample time [s]."""
-        return self.ensemble.twins[0].dt
+        return self.ensemble.dt
 
     def reset(
         self,
@@ -144,8 +147,7 @@ class StagedObserver:
         """See `estimators.base.Estimator`."""
         self._memory = _memory(self._laws[1].copy(), initial_deltas(parameters))
         staged_kernel.set_all(self.ensemble.cars, self._memory.theta)
-        for twin in self.ensemble.twins:
-            settle(twin, speed, road)
+        self.ensemble.settle(speed, road)
 
     def run(self, drive: Drive) -> StagedEstimate:
         """Observes a whole drive, one stage after the other.
@@ -153,32 +155,28 @@ class StagedObserver:
         Raises:
             TwinError: the drive does not fit the twins, or a twin blew up.
         """
-        check_inputs(drive.inputs, "drive")
+        inputs, measurements = self.ensemble.given_by(drive)
         ensemble, n = self.ensemble, len(drive)
         log = Log(
             states=np.empty((n, len(STATES))),
             parameters=np.empty((n, len(PARAMETERS))),
             outputs=np.empty((n, len(OUTPUTS))),
-            extended=np.empty((n, *ensemble.cars[0].tyre_output.shape)),
+            extended=np.empty((n, *EXTENDED_SHAPE)),
             stage=np.empty(n, dtype=np.int64),
-            sd=np.empty((n, len(self.estimated))),
+            sd=np.empty((n, self._laws[0].size + len(CM))),
         )
         done = staged_kernel.run(
             ensemble.cars, self._setup, self._memory, new_block(len(ensemble)), self._laws[0],
-            drive.inputs, drive.measurements, log,
+            inputs, measurements, log,
         )  # fmt: skip
         if done < n:
-            raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
+            raise ensemble.blown_up(drive.time[done])
         return StagedEstimate(
             time=drive.time,
-            states=log.states,
-            parameters=log.parameters,
-            outputs=log.outputs,
-            extended=log.extended.reshape(n, -1),
-            nominal=ensemble.cars[0].nominal.copy(),
+            **ensemble.histories(log.states, log.parameters, log.outputs, log.extended),
             stage=log.stage,
             estimated=self.estimated,
-            sd=log.sd,
+            sd=log.sd[:, : len(self.estimated)],
         )
 
 
@@ -216,7 +214,10 @@ def _memory(laws: Array, theta: Array) -> Memory:
 
 def _make(given: Given) -> StagedObserver:
     settings = given.settings or StagedSettings()
-    return StagedObserver(given.car(), given.noise(OUTPUTS), given.laws, settings)
+    source = given.source()
+    names = parameters_of(source, [law.parameter for law in given.laws])
+    laws = [law for law in given.laws if law.parameter in names]
+    return StagedObserver(source, given.noise(OUTPUTS), laws, settings)
 
 
 ENTRY = Entry(

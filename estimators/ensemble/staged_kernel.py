@@ -16,17 +16,19 @@ from estimators.ensemble.blocks import (
     ABSENT,
     AFTER_WHEELS,
     FIRST_WHEEL,
+    LEAST_SPIN,
     NX,
     NY,
     ROLL,
     advance,
+    are_sound,
     follow_speed,
     kalman_step,
     move_states,
 )
+from estimators.ensemble.stepping import read_extended, read_states, set_parameters
 from estimators.til.law import advance_law
 from twin import IMU, PARAMETER, PARAMETERS, P, Y
-from twin.kernel import is_sound, read_states, set_parameters
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -75,6 +77,8 @@ class Memory(NamedTuple):
 @njit(cache=True, nogil=True)
 def _condition(setup, memory, y):
     """Whether the drive is, now, what the stage wants."""
+    if setup.seconds[memory.stage[0]] < setup.dt:  # nothing to wait for
+        return True
     for k in range(FIRST_WHEEL, AFTER_WHEELS):
         if y[k] < setup.least_wheel_speed:  # NaN is not
             return False
@@ -171,7 +175,7 @@ def _find_cm(cars, setup, memory, block):
         change = d @ (filtered[1:n] - filtered[0])
         for i in range(n):
             filtered[i] += change
-    states = np.empty((n, NX))
+    states = np.zeros((n, NX))
     for i in range(n):
         read_states(cars[i], states[i])
     change = d @ (states[1:] - states[0])
@@ -191,19 +195,19 @@ def run(cars, setup, memory, block, laws, inputs, measurements, log):
         _single_laws(cars, setup, memory, laws, y, block.out[0], active)
         if full:
             _low_pass(setup, memory, block)
-            follow_speed(cars, block, setup.speed_gain * setup.block * setup.dt)
+            share = setup.speed_gain * setup.block * setup.dt
+            follow_speed(cars, block.mean, block.measured, block.number, share, LEAST_SPIN)
             if active and memory.stage[0] == CM:
                 _find_cm(cars, setup, memory, block)
         log.parameters[k] = memory.theta
         log.outputs[k] = block.out[0]
-        log.extended[k] = cars[0].tyre_output
+        read_extended(cars[0], log.extended[k])
         log.stage[k] = memory.stage[0]
         log.sd[k, : laws.size] = np.sqrt(memory.laws[:, 0])
         for i in range(3):
             log.sd[k, laws.size + i] = np.sqrt(memory.covariance[i, i])
-        for i in range(cars.size):
-            if not is_sound(cars[i]):
-                return k
+        if not are_sound(cars):
+            return k
     return inputs.shape[0]
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators.base import Estimate
-from estimators.black_box import settle
 from estimators.ensemble import unscented_kernel
 from estimators.ensemble.blocks import new_block
+from estimators.ensemble.twins import EXTENDED_SHAPE, Source, Twins, parameters_of
 from estimators.ensemble.unscented_kernel import Log, Memory, Setup
 from estimators.entry import Entry, Given
 from estimators.priors import initial_deltas, prior_sds
@@ -25,10 +25,6 @@ from twin import (
     SCALES,
     STATES,
     Drive,
-    Ensemble,
-    TwinError,
-    Vehicle,
-    check_inputs,
 )
 
 Array = NDArray[np.float64]
@@ -48,7 +44,7 @@ class UnscentedObserver:
     """Estimates p parameters by 2p + 1 twins.
 
     Args:
-        vehicle: of the twins.
+        source: of the twins: a vehicle, or what makes a black box, called once for each.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
         parameters: of `twin.PARAMETERS`; the others stay nominal.
         prior_sd: by parameter, instead of that of its record.
@@ -59,25 +55,21 @@ class UnscentedObserver:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        source: Source,
         noise_sd: ArrayLike,
         parameters: Sequence[str] = (*LOAD, *SCALES),
         prior_sd: Mapping[str, float] | None = None,
     ) -> None:
-        if not set(parameters) <= set(PARAMETERS) or len(set(parameters)) < len(parameters):
-            raise TwinError(
-                f"unscented: parameters are {', '.join(parameters)}; allowed: each at most once of "
-                f"{', '.join(PARAMETERS)}"
-            )
         self.estimated = tuple(parameters)
-        self.ensemble = Ensemble(vehicle, 2 * len(parameters) + 1)
-        noise = np.asarray(noise_sd, dtype=np.float64)
+        self.ensemble = Twins(source, 2 * len(parameters) + 1)
+        self.ensemble.require("unscented", parameters)
+        noise = self.ensemble.used(noise_sd, "unscented")
         self._setup = _setup(self.ensemble, parameters, noise, prior_sds(parameters, prior_sd))
 
     @property
     def dt(self) -> float:
         """Sample time [s]."""
-        return self.ensemble.twins[0].dt
+        return self.ensemble.dt
 
     def reset(
         self,
@@ -88,8 +80,7 @@ class UnscentedObserver:
         """See `estimators.base.Estimator`."""
         self._memory = _memory(self._setup, initial_deltas(parameters))
         unscented_kernel.place(self.ensemble.cars, self._setup, self._memory)
-        for twin in self.ensemble.twins:
-            settle(twin, speed, road)
+        self.ensemble.settle(speed, road)
 
     def run(self, drive: Drive) -> Estimate:
         """Observes a whole drive.
@@ -97,50 +88,45 @@ class UnscentedObserver:
         Raises:
             TwinError: the drive does not fit the twins, or a twin has blown up.
         """
-        check_inputs(drive.inputs, "drive")
+        inputs, measurements = self.ensemble.given_by(drive)
         ensemble, n = self.ensemble, len(drive)
         log = Log(
             states=np.empty((n, len(STATES))),
             parameters=np.empty((n, len(PARAMETERS))),
             outputs=np.empty((n, len(OUTPUTS))),
-            extended=np.empty((n, *ensemble.cars[0].tyre_output.shape)),
+            extended=np.empty((n, *EXTENDED_SHAPE)),
             sd=np.empty((n, len(self.estimated))),
         )
         done = unscented_kernel.run(
-            ensemble.cars, self._setup, self._memory, new_block(len(ensemble)), drive.inputs,
-            drive.measurements, log,
+            ensemble.cars, self._setup, self._memory, new_block(len(ensemble)), inputs,
+            measurements, log,
         )  # fmt: skip
         if done < n:
-            raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
+            raise ensemble.blown_up(drive.time[done])
         return Estimate(
             time=drive.time,
-            states=log.states,
-            parameters=log.parameters,
-            outputs=log.outputs,
-            extended=log.extended.reshape(n, -1),
-            nominal=self._setup.nominal,
+            **ensemble.histories(log.states, log.parameters, log.outputs, log.extended),
             estimated=self.estimated,
             sd=log.sd,
         )
 
 
 def _setup(
-    ensemble: Ensemble, parameters: Sequence[str], noise_sd: Array, prior_sd: Mapping[str, float]
+    ensemble: Twins, parameters: Sequence[str], noise_sd: Array, prior_sd: Mapping[str, float]
 ) -> Setup:
     prior = np.array([*(prior_sd[name] for name in parameters), *BIAS_SD])
-    twin = ensemble.twins[0]
     return Setup(
         column=np.array([PARAMETERS.index(name) for name in parameters], dtype=np.int64),
         prior=prior,
         step_limit=STEP * prior,
         drift=(DRIFT * prior) ** 2,
         noise=NOISE_FACTOR * noise_sd**2,
-        nominal=twin.car.nominal.copy(),
+        nominal=ensemble.nominal.copy(),
         block=BLOCK,
-        hold_off=round(HOLD_OFF / (BLOCK * twin.dt)),
+        hold_off=round(HOLD_OFF / (BLOCK * ensemble.dt)),
         speed_gain=SPEED_GAIN,
         least_excitation=LEAST_EXCITATION,
-        dt=twin.dt,
+        dt=ensemble.dt,
     )
 
 
@@ -159,8 +145,9 @@ def _memory(setup: Setup, theta: Array) -> Memory:
 
 
 def _make(given: Given) -> UnscentedObserver:
-    parameters = given.parameters or (*LOAD, *SCALES)
-    return UnscentedObserver(given.car(), given.noise(OUTPUTS), parameters, given.prior_sd)
+    source = given.source()
+    parameters = given.parameters or parameters_of(source, (*LOAD, *SCALES))
+    return UnscentedObserver(source, given.noise(OUTPUTS), parameters, given.prior_sd)
 
 
 ENTRY = Entry(

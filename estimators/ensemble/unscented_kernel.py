@@ -18,16 +18,18 @@ from numpy.typing import NDArray
 
 from estimators.ensemble.blocks import (
     ABSENT,
+    LEAST_SPIN,
     NY,
     ROLL,
     advance,
+    are_sound,
     follow_speed,
     kalman_step,
     move_states,
 )
 from estimators.ensemble.rigid_body import project
+from estimators.ensemble.stepping import read_extended, read_states, set_parameters
 from twin import OUTPUTS
-from twin.kernel import is_sound, read_states, set_parameters
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -175,15 +177,15 @@ def run(cars, setup, memory, block, inputs, measurements, log):
         read_states(cars[0], log.states[k])
         if advance(cars, block, setup.block, inputs[k], measurements[k]):
             _estimate(cars, setup, memory, block)
-            follow_speed(cars, block, setup.speed_gain * setup.block * setup.dt)
+            share = setup.speed_gain * setup.block * setup.dt
+            follow_speed(cars, block.mean, block.measured, block.number, share, LEAST_SPIN)
         log.parameters[k] = memory.theta
         log.outputs[k] = block.out[0]
-        log.extended[k] = cars[0].tyre_output
+        read_extended(cars[0], log.extended[k])
         for i in range(p):
             log.sd[k, i] = np.sqrt(memory.covariance[i, i])
-        for i in range(cars.size):
-            if not is_sound(cars[i]):
-                return k
+        if not are_sound(cars):
+            return k
     return inputs.shape[0]
 
 

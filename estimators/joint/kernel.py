@@ -10,12 +10,13 @@ twins follow smoothly (`estimators.joint.parameter_tracking`).
 import numpy as np
 from numba import njit
 
-from estimators.ensemble.blocks import kalman_step
+from estimators.ensemble.blocks import are_sound, follow_speed, kalman_step, step_all
 from estimators.ensemble.rigid_body import project
+from estimators.ensemble.stepping import read_extended, read_states
 from estimators.joint.evidence import FULL, add_evidence, forget_evidence
 from estimators.joint.linearisation_error import add_linearisation_error, wait_after_impact
 from estimators.joint.noise_inflation import forget_load, inflate_noise, keep, load_changed
-from estimators.joint.parameter_tracking import track_parameters, track_speed
+from estimators.joint.parameter_tracking import track_parameters
 from estimators.joint.state import (
     ABSENT,
     AFTER_WHEELS,
@@ -37,14 +38,12 @@ from estimators.joint.state import (
     WAIT,
     WATCH,
 )
-from twin.kernel import is_sound, read_states, step
 
 
 @njit(cache=True, nogil=True)
 def update(cars, config, state, u, y):
     """One sample of inputs (nu,) and measurements (ny,); tells if a segment is complete."""
-    for i in range(cars.size):
-        step(cars[i], u, state.out[i])
+    step_all(cars, u, state.out)
     _delay(config, state)
     for i in range(cars.size):
         for j in range(NY):
@@ -59,7 +58,9 @@ def update(cars, config, state, u, y):
     state.clock[SAMPLES] = 0
     state.clock[BLOCKS] += 1
     complete = _estimate(cars, config, state)
-    track_speed(cars, config, state)
+    share = config.speed_gain * config.block * config.dt
+    means, measured = state.total / config.block, state.measured / state.present
+    follow_speed(cars, means, measured, state.present, share, LEAST_SPIN)
     state.total[:] = 0.0
     state.measured[:] = 0.0
     state.present[:] = 0.0
@@ -261,14 +262,13 @@ def run(cars, config, state, inputs, measurements, log, first):
         complete = update(cars, config, state, inputs[k], measurements[k])
         log.parameters[k] = state.estimate
         log.outputs[k] = state.out[0]
-        log.extended[k] = cars[0].tyre_output
+        read_extended(cars[0], log.extended[k])
         _standard_deviations(config, state, log.sd[k])
         log.sensor_errors[k] = state.z[p:]
         log.changes[k] = state.changes[0]
         log.segments[k] = state.evidence[FULL]
-        for i in range(cars.size):
-            if not is_sound(cars[i]):
-                return k, False
+        if not are_sound(cars):
+            return k, False
         if complete:
             return k + 1, True
     return inputs.shape[0], True

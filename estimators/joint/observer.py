@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimators.base import Estimate
-from estimators.black_box import settle
-from estimators.drive_channels import check_measurements, given_by
+from estimators.drive_channels import check_measurements
+from estimators.ensemble.twins import EXTENDED_SHAPE, Source, Twins, parameters_of
 from estimators.entry import Entry, Given
 from estimators.joint import kernel as joint_kernel
 from estimators.joint.evidence import FILLED, FULL, SEGMENTS, USED, merge_segments
@@ -28,12 +28,11 @@ from twin import (
     PARAMETER,
     PARAMETERS,
     SCALES,
+    STATES,
     Drive,
-    Ensemble,
     Snapshot,
     TwinError,
     Vehicle,
-    check_inputs,
 )
 
 Array = NDArray[np.float64]
@@ -174,7 +173,7 @@ class JointObserver:
     """Estimates parameters of a black box jointly, by twins that differ in one each.
 
     Args:
-        vehicle: of the twins.
+        source: of the twins: a vehicle, or what makes a black box, called once for each.
         noise_sd: (10,) standard deviation of a sample's white noise by channel; NaN: not used.
         settings: what is estimated, and how.
 
@@ -184,14 +183,15 @@ class JointObserver:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        source: Source,
         noise_sd: ArrayLike,
         settings: JointSettings = JointSettings(),
     ) -> None:
         self.settings = settings
         names = settings.parameters
-        _check_noise(np.asarray(noise_sd, dtype=np.float64))
-        self.ensemble = Ensemble(vehicle, len(names) + 1)
+        self.ensemble = Twins(source, len(names) + 1)
+        self.ensemble.require("joint", names)
+        noise = self.ensemble.used(noise_sd, "joint")
         self.estimated = (*names, *settings.sensor_errors)
         prior = {name: PARAMETER[name].prior_sd for name in names} | dict(settings.prior_sd)
         errors = [SENSOR_ERROR[name] for name in settings.sensor_errors]
@@ -202,8 +202,7 @@ class JointObserver:
         for i, error in enumerate(errors, len(names)):
             if error.drift is not None:
                 drift[i] = error.drift
-        first = self.ensemble.twins[0]
-        self.dt = first.dt
+        self.dt = self.ensemble.dt
         self._config = Configuration(
             parameter=np.array([PARAMETERS.index(name) for name in names], dtype=np.int64),
             step=np.array([PARAMETER[name].step for name in names]),
@@ -218,8 +217,8 @@ class JointObserver:
             impact_wait=settings.impact_wait,
             step_limit=settings.step_limit * self._prior,
             drift=drift**2,
-            noise=np.asarray(noise_sd, dtype=np.float64) ** 2,
-            nominal=first.car.nominal.copy(),
+            noise=noise**2,
+            nominal=self.ensemble.nominal.copy(),
             block=settings.block,
             segment=max(1, round(settings.segment / (settings.block * self.dt))),
             hold_off=round(settings.hold_off / (settings.block * self.dt)),
@@ -238,7 +237,7 @@ class JointObserver:
             dt=self.dt,
         )
         n, p, q = len(self.ensemble), len(PARAMETERS), self._prior.size
-        ny, nx = len(OUTPUTS), len(first.states)
+        ny, nx = len(OUTPUTS), len(STATES)
         self._state = State(
             theta=np.zeros(p), estimate=np.zeros(p), z=np.zeros(q), covariance=np.zeros((q, q)),
             out=np.zeros((n, ny)), total=np.zeros((n, ny)), measured=np.zeros(ny),
@@ -260,7 +259,9 @@ class JointObserver:
             window_sums=np.zeros((WINDOWS.size, ny, 2 + q)), prior_mean=np.zeros(q),
             prior_covariance=np.zeros((q, q)), evidence=np.zeros(4, dtype=np.int64),
         )  # fmt: skip
-        self.reset(0.0)
+        self.budget = None
+        if isinstance(source, Vehicle):  # others may not know how to stand
+            self.reset(0.0)
 
     def reset(
         self,
@@ -285,12 +286,12 @@ class JointObserver:
         state.inflation[:] = self.settings.noise_inflation
         joint_kernel.start_evidence(self._config, state)
         self.budget = None
-        for i, twin in enumerate(self.ensemble.twins):
+        for i in range(len(self.ensemble)):
             p = state.theta.copy()
             if i > 0:
                 p[self._config.parameter[i - 1]] += self._config.step[i - 1]
-            twin.set_parameters(p)
-            settle(twin, speed, road)
+            self.ensemble.set_parameters(i, p)
+        self.ensemble.settle(speed, road)
 
     def _weigh(self) -> None:
         """Weighs the evidence at the end of a segment, and goes on from what it says."""
@@ -349,18 +350,17 @@ class JointObserver:
         """
         u = np.ascontiguousarray(u, dtype=np.float64)
         y = np.ascontiguousarray(y, dtype=np.float64)
-        check_inputs(u[None], "update")
+        self.ensemble.check_inputs(u[None], "update")
         check_measurements(y[None], OUTPUTS, "update", infinite=False)
         if joint_kernel.update(self.ensemble.cars, self._config, self._state, u, y):
             self._weigh()
-        for twin in self.ensemble.twins:
-            twin.check()
+        self.ensemble.check()
         return self._state.estimate.copy()
 
     def snapshot(self) -> JointSnapshot:
         """Everything that decides the future; a run from it is bit-exact."""
         return JointSnapshot(
-            tuple(twin.snapshot() for twin in self.ensemble.twins),
+            self.ensemble.snapshot(),
             self._state._replace(
                 **{name: array.copy() for name, array in self._state._asdict().items()}
             ),
@@ -380,8 +380,7 @@ class JointObserver:
                 f"{len(snapshot.twins)} twins; allowed: {self._state.z.size} of "
                 f"{len(self.ensemble)}"
             )
-        for twin, kept in zip(self.ensemble.twins, snapshot.twins, strict=True):
-            twin.restore(kept)
+        self.ensemble.restore(snapshot.twins)
         for array, kept in zip(self._state, snapshot.state, strict=True):
             array[:] = kept
         self.budget = None
@@ -392,16 +391,14 @@ class JointObserver:
         Raises:
             TwinError: the drive does not fit the twins, or a twin has blown up.
         """
-        twin = self.ensemble.twins[0]
-        given = given_by(drive, twin, None)
-        check_measurements(given.measurements, OUTPUTS, "drive", infinite=False)
-        check_inputs(given.inputs, "drive")
+        inputs, measurements = self.ensemble.given_by(drive)
+        check_measurements(measurements, OUTPUTS, "drive", infinite=False)
         n, q = len(drive), self._prior.size
         log = Log(
-            states=np.empty((n, len(twin.states))),
+            states=np.empty((n, len(STATES))),
             parameters=np.empty((n, len(PARAMETERS))),
             outputs=np.empty((n, len(OUTPUTS))),
-            extended=np.empty((n, *twin.car.tyre_output.shape)),
+            extended=np.empty((n, *EXTENDED_SHAPE)),
             sd=np.empty((n, q)),
             sensor_errors=np.empty((n, q - self._config.parameter.size)),
             changes=np.empty(n, dtype=np.int64),
@@ -410,22 +407,17 @@ class JointObserver:
         done = 0
         while done < n:
             done, sound = joint_kernel.run(
-                self.ensemble.cars, self._config, self._state, given.inputs, given.measurements,
-                log, done,
+                self.ensemble.cars, self._config, self._state, inputs, measurements, log, done,
             )  # fmt: skip
             if not sound:
-                raise TwinError(f"drive: a twin blew up at t = {drive.time[done]:.3f} s")
+                raise self.ensemble.blown_up(drive.time[done])
             if self._state.evidence[FILLED] == 0 and self._state.evidence[USED] > 0:
                 self._weigh()
                 joint_kernel.claim(self._config, self._state, log, done - 1)
         valid, reason = judge(log, self._config, self.settings.valid_share)
         return JointEstimate(
             time=drive.time,
-            states=log.states,
-            parameters=log.parameters,
-            outputs=log.outputs,
-            extended=log.extended.reshape(n, -1),
-            nominal=self._config.nominal.copy(),
+            **self.ensemble.histories(log.states, log.parameters, log.outputs, log.extended),
             estimated=self.estimated,
             sensor_error_names=self.settings.sensor_errors,
             prior=self._prior.copy(),
@@ -441,21 +433,16 @@ class JointObserver:
         )
 
 
-def _check_noise(noise_sd: Array) -> None:
-    if noise_sd.shape != (len(OUTPUTS),) or not (np.isnan(noise_sd) | (noise_sd > 0.0)).all():
-        raise TwinError(
-            f"joint: noise_sd is {noise_sd.tolist()}; allowed: {len(OUTPUTS)} numbers above zero, "
-            "NaN for a channel that is not used"
-        )
-
-
 def _make(given: Given) -> JointObserver:
     settings = given.settings or JointSettings()
     if given.parameters is not None:
         settings = replace(settings, parameters=given.parameters)
     if given.prior_sd:
         settings = replace(settings, prior_sd={**settings.prior_sd, **given.prior_sd})
-    return JointObserver(given.car(), given.noise(OUTPUTS), settings)
+    names = parameters_of(given.source(), settings.parameters)
+    if given.parameters is None and names != settings.parameters:
+        settings = replace(settings, parameters=names)
+    return JointObserver(given.source(), given.noise(OUTPUTS), settings)
 
 
 ENTRY = Entry(

@@ -12,18 +12,13 @@ import numpy as np
 from numba import njit
 
 from estimators.ensemble.blocks import move_states
+from estimators.ensemble.stepping import read_states, set_parameters
 from estimators.joint.state import (
-    AFTER_SPINS,
-    AFTER_WHEELS,
-    FIRST_SPIN,
-    FIRST_WHEEL,
-    LEAST_SPIN,
     NX,
     ROLL,
     SPEED,
     VX,
 )
-from twin.kernel import correct, read_states, set_parameters
 
 
 @njit(cache=True, nogil=True)
@@ -72,27 +67,3 @@ def _bound_speed_certainty(config, state):
         if config.sensor_error[i - config.parameter.size] == SPEED:
             least = config.speed_curvature * moved * uncertain
             state.covariance[i, i] = max(state.covariance[i, i], least)
-
-
-@njit(cache=True, nogil=True)
-def track_speed(cars, config, state):
-    """Draws each twin's speed weakly to its own innovation of the wheel speeds."""
-    share = config.speed_gain * config.block * config.dt
-    if share == 0.0:
-        return
-    for i in range(cars.size):
-        late, spin, n = 0.0, 0.0, 0
-        for j in range(FIRST_WHEEL, AFTER_WHEELS):
-            if state.present[j] > 0.0:
-                mean = state.total[i, j] / config.block
-                late += state.measured[j] / state.present[j] - mean
-                spin += mean
-                n += 1
-        if n == 0 or spin < n * LEAST_SPIN:
-            continue
-        read_states(cars[i], state.states[i])
-        state.dx[:] = 0.0
-        state.dx[VX] = share * late / spin * state.states[i, VX]
-        for k in range(FIRST_SPIN, AFTER_SPINS):
-            state.dx[k] = share * late / spin * state.states[i, k]
-        correct(cars[i], state.dx)

@@ -18,7 +18,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from estimators.base import Estimate
-from estimators.black_box import BlackBox, settle
+from estimators.black_box import BlackBox, nominal_of, settle
 from estimators.drive_channels import DriveChannels, check_measurements, given_by
 from estimators.entry import Entry, Given
 from estimators.priors import initial_deltas
@@ -282,7 +282,7 @@ class Observer:
             parameters=parameters,
             outputs=outputs,
             extended=np.empty((len(drive), 0)),
-            nominal=np.full(len(twin.parameters), np.nan),
+            nominal=nominal_of(twin),
             state_names=twin.states,
             parameter_names=twin.parameters,
             output_names=twin.outputs,
