@@ -11,7 +11,7 @@ from scenarios.calibration.calibrate import Task, residuals
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
 from scenarios.logs.candidate import Candidate
-from scenarios.logs.free_parameters import FREE
+from scenarios.logs.free_parameters import BAND, FREE
 from twin import OUTPUTS, TwinError, Vehicle
 
 FACTORS = {"front_cornering_stiffness": 0.85, "rear_cornering_stiffness": 1.2}
@@ -155,6 +155,39 @@ def test_command_leaves_nothing_after_a_mistake(log, tmp_path, capsys):
     assert main(command) == 2
     assert "til: calibrate: 'colour' is no parameter" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_what_a_log_shows_is_fitted_and_freed_unless_somebody_says_else(torqueless, tmp_path):
+    assert calibrate.default_signals([torqueless], follows=True) == ("sideslip",)
+    blind = [torqueless.replace(truth={})]
+    assert calibrate.default_signals(blind, follows=True) == ("ay", "yaw_rate")
+    assert calibrate.default_signals([torqueless], follows=False) == ("ay", "yaw_rate")
+    assert "sideslip_offset" in calibrate.default_free(("sideslip",))
+    assert set(calibrate.default_free(("ay",))) < set(calibrate.default_free(("sideslip",)))
+    assert set(calibrate.default_free(("sideslip",))) < set(FREE)
+    file = tmp_path / "log.parquet"
+    torqueless.save(file)
+    whole, nothing = calibrate.task_of([file], None, "suv", (), (), held_out=0.0)
+    most, kept = calibrate.task_of([file], None, "suv", (), (), held_out=0.5)
+    assert (whole.signals, nothing) == (("sideslip",), ())
+    assert len(most.drives[0]) == pytest.approx(0.5 * len(whole.drives[0]), abs=1)
+    assert len(kept[0]) == pytest.approx(len(most.drives[0]), abs=1)
+
+
+def test_band_is_as_wide_as_the_errors_of_what_was_not_fitted(torqueless):
+    """The other half of the drive shows another sideslip: the band has to hold there."""
+    candidate = Candidate(vehicle=SUV, follower=calibrate.driven(SUV), scheduled=True)
+    fitted = Task(candidate=candidate, free=("drag",), signals=("sideslip",), drives=(torqueless,))
+    off = torqueless.replace(
+        truth={**torqueless.truth, "sideslip": torqueless.truth["sideslip"] + 0.05}
+    )
+    alone = calibrate.with_band(fitted, np.ones(1)).candidate.values[BAND]
+    wider = calibrate.with_band(fitted, np.ones(1), (off,)).candidate.values[BAND]
+    assert wider > alone + 0.5
+    found = fitted.at(np.ones(1))
+    held = replace(found, values={**found.values, BAND: wider}).run(off)
+    error = np.abs(found.sideslip(held) - off.truth["sideslip"])
+    assert np.mean(error < 1.97 * held.sideslip_sd) == pytest.approx(0.95, abs=0.01)
 
 
 def test_file_that_is_no_calibration_is_refused(tmp_path):

@@ -28,7 +28,14 @@ from scenarios.experiment.progress import parallel
 from scenarios.experiment.result import Result, Row, replacing, versions
 from scenarios.logs.candidate import Candidate
 from scenarios.logs.follower import driven
-from scenarios.logs.free_parameters import BAND, FREE, NOISES, starts
+from scenarios.logs.free_parameters import (
+    BAND,
+    DEFAULTS,
+    DEFAULTS_OF_SIDESLIP,
+    FREE,
+    NOISES,
+    starts,
+)
 from scenarios.logs.pieces import prepared
 from twin import OUTPUTS, WHEEL_SPEEDS, WHEELS, Drive, Twin, TwinError, Vehicle
 from twin.car.signals import signals_of
@@ -199,6 +206,7 @@ def task_of(
     free: Sequence[str],
     signals: Sequence[str],
     between: tuple[float | None, float | None] = (None, None),
+    held_out: float = HELD_OUT,
 ) -> tuple[Task, tuple[Drive, ...]]:
     """A task of the command line: the twin runs free, but for gains that are freed.
 
@@ -210,12 +218,13 @@ def task_of(
         logs: recorded drives, read as `til estimate` reads them.
         map_path: which channels of the logs are ours; None: they are drives of this project.
         vehicle: a car of the project by its name, or an MJCF or TOML file.
-        free: what is fitted, see `Task`.
-        signals: what to, see `Task`.
+        free: what is fitted, see `Task`; nothing: what `defaults` says.
+        signals: what to, see `Task`; nothing: what `defaults` says.
         between: the logs' times that are used [s]; None: from their start, to their end.
+        held_out: share of each log, at its end, that is not fitted.
 
     Returns:
-        The task, over all but the last `HELD_OUT` of each log; and what is held out.
+        The task, over all but the last share of each log; and what is held out.
 
     Raises:
         TwinError: a file is missing or broken, or nothing lies between the times.
@@ -223,18 +232,21 @@ def task_of(
     car = Vehicle.load(vehicle)
     dt = float(car.compile().opt.timestep)
     first, last = between
-    used, held_out = [], []
+    used, kept = [], []
     for log in logs:
         drive = Drive.load(log, map_path, signals_of(car))
         for piece in prepared(_between(drive, first, last), dt).pieces:
-            end = round((1.0 - HELD_OUT) * len(piece))
+            end = round((1.0 - held_out) * len(piece))
             used.append(cut(piece, slice(0, end)))
-            held_out.append(cut(piece, slice(end, len(piece))))
+            if len(piece) - end > 1:
+                kept.append(cut(piece, slice(end, len(piece))))
+    follows = any(not set(TORQUES) & set(piece.input_names) for piece in used)
+    signals = signals or default_signals(used, follows=follows)
+    free = free or default_free(signals)
     offsets = [f"{s}_offset" for s in signals if s != "sideslip" and f"{s}_offset" in FREE]
     blocks = sum(len(piece) for piece in used) * dt / BLOCK
-    if not free or blocks <= len(free) + len(offsets) + 1:  # too short a drive for more
+    if blocks <= len(free) + len(offsets) + 1:  # too short a drive for more
         offsets = []
-    follows = any(not set(TORQUES) & set(piece.input_names) for piece in used)
     scheduled = follows and "sideslip" in signals
     task = Task(
         candidate=Candidate(
@@ -248,7 +260,19 @@ def task_of(
         drives=tuple(used),
         prior_sd=_priors(car),
     )
-    return task, tuple(piece for piece in held_out if len(piece) > 1)
+    return task, tuple(kept)
+
+
+def default_signals(drives: Sequence[Drive], *, follows: bool) -> tuple[str, ...]:
+    """The measured sideslip, if there is one and the twin follows the speed; else ay, yaw rate."""
+    if follows and any(_has(drive, "sideslip") for drive in drives):
+        return ("sideslip",)
+    return "ay", "yaw_rate"
+
+
+def default_free(signals: Sequence[str]) -> tuple[str, ...]:
+    """What a data sheet knows least of, as far as these signals show it."""
+    return (*DEFAULTS, *(DEFAULTS_OF_SIDESLIP if "sideslip" in signals else ()))
 
 
 def _priors(vehicle: Vehicle) -> dict[str, float]:
@@ -304,7 +328,7 @@ def run(
     start = time.perf_counter()
     found = calibrate(task, jobs=jobs, evaluations=evaluations)
     task, found = _as_driven(task, found)
-    task = with_band(task, found.values)
+    task = with_band(task, found.values, held_out)
     write(path, task, logs, found)
     return Result(
         name="calibrate",
@@ -320,24 +344,30 @@ def run(
     )
 
 
-def with_band(task: Task, values: Array) -> Task:
+def with_band(task: Task, values: Array, held_out: Sequence[Drive] = ()) -> Task:
     """The task with the factor on the observer's standard deviations that its errors ask for.
 
-    95 % of the errors of the sideslip are then below twice the standard deviation.
+    95 % of the errors of the sideslip are then below twice the standard deviation, over what was
+    fitted and over what was not.
     """
     candidate = task.at(values)
     if not candidate.scheduled or "sideslip" not in task.signals:
         return task
+    band = max(_band(candidate, drives) for drives in (task.drives, held_out) if drives)
+    band_before = task.candidate.values.get(BAND, 0.0)
+    known = {**task.candidate.values, BAND: band_before + math.log(band)}
+    return replace(task, candidate=replace(task.candidate, values=known))
+
+
+def _band(candidate: Candidate, drives: Sequence[Drive]) -> float:
+    """95 % quantile of the sideslip's errors in standard deviations, over that of a normal one."""
     scaled = []
-    for drive in task.drives:
+    for drive in drives:
         found = candidate.run(drive)
         assert found.sideslip_sd is not None
         error = np.abs(candidate.sideslip(found) - drive.truth["sideslip"])
         scaled.append(error / np.maximum(found.sideslip_sd, 1e-9))
-    band = max(float(np.nanquantile(np.concatenate(scaled), 0.95)) / _NORMAL_95, 1e-3)
-    band_before = task.candidate.values.get(BAND, 0.0)
-    known = {**task.candidate.values, BAND: band_before + math.log(band)}
-    return replace(task, candidate=replace(task.candidate, values=known))
+    return max(float(np.nanquantile(np.concatenate(scaled), 0.95)) / _NORMAL_95, 1e-3)
 
 
 def _held_out(task: Task, found: Fit, drives: Sequence[Drive]) -> list[Row]:

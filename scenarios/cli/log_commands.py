@@ -54,15 +54,29 @@ def inspect(log: Path, map_path: Path | None, vehicle: str | None) -> None:
     help="Which channels of the logs are ours; a drive of ours needs none.",
 )
 @click.option("--vehicle", required=True, metavar="CAR", help="A car's name, MJCF or TOML file.")
-@click.option("--free", required=True, type=Names(), metavar="NAME,...", help="What is fitted.")
+@click.option(
+    "--free",
+    type=Names(),
+    metavar="NAME,...",
+    default="",
+    help="What is fitted.  [default: tyres, relaxation, cm_x, offsets]",
+)
 @click.option(
     "--fit",
     "signals",
     type=Names(),
     metavar="NAME,...",
-    default="ay,yaw_rate",
+    default="",
+    help="Signals that the twin is to show as the log does.  [default: ay,yaw_rate; of a log "
+    "without torques the sideslip of its truth, if it has one]",
+)
+@click.option(
+    "--held-out",
+    type=click.FloatRange(0.0, 0.9),
+    default=0.25,
     show_default=True,
-    help="Signals that the twin is to show as the log does; sideslip is that of the log's truth.",
+    metavar="SHARE",
+    help="Of each log, at its end, that is not fitted: the result and its band are held to it.",
 )
 @click.option("--from", "first", type=float, metavar="S", help="First time used.")
 @click.option("--to", "last", type=float, metavar="S", help="Last time used.")
@@ -78,6 +92,7 @@ def calibrate(
     vehicle: str,
     free: tuple[str, ...],
     signals: tuple[str, ...],
+    held_out: float,
     first: float | None,
     last: float | None,
     evaluations: int,
@@ -90,8 +105,9 @@ def calibrate(
     FILE holds values, their 95 % confidence intervals and where they come from; it is a car that
     --vehicle takes. A factor of 1 and a delta or offset of 0 are what the car's files say, and are
     believed beforehand as far as the data do not say otherwise. The last quarter of each log is not
-    fitted: the result is scored on it. Where a log has no torques the twin follows the measured vx,
-    and the mass is not observable.
+    fitted: the result is scored on it, and the band of the sideslip is as wide as the errors there
+    ask for. Where a log has no torques the twin follows the measured vx, and the mass is not
+    observable.
 
     What can be freed: factors of tyre_friction, cornering_stiffness, slip_stiffness,
     combined_slip, load_of_largest_stiffness, lateral_curvature and relaxation, each also with
@@ -103,8 +119,10 @@ def calibrate(
     path = out or Path("out", "calibrate.toml")
     path.parent.mkdir(parents=True, exist_ok=True)
     calibration = catalogue.calibrate()
-    task, held_out = calibration.task_of(logs, map_path, vehicle, free, signals, (first, last))
-    found = calibration.run(task, logs, path, jobs=jobs, evaluations=evaluations, held_out=held_out)
+    task, kept = calibration.task_of(
+        logs, map_path, vehicle, free, signals, (first, last), held_out
+    )
+    found = calibration.run(task, logs, path, jobs=jobs, evaluations=evaluations, held_out=kept)
     report(found, json_path)
 
 

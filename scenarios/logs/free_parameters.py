@@ -127,6 +127,16 @@ FREE: Mapping[str, Free] = {
 }
 
 
+# What is freed unless the user says something else: what a data sheet knows least of, as far as a
+# drive without torques shows it
+_TYRES = ("tyre_friction", "cornering_stiffness", "load_of_largest_stiffness")
+DEFAULTS = (
+    *(f"{axle}_{name}" for name in _TYRES for axle in ("front", "rear")),
+    *("relaxation", "cm_x", "steering_offset"),
+)
+DEFAULTS_OF_SIDESLIP = ("sideslip_offset", "sideslip_lever")
+
+
 def noise_of(values: Mapping[str, float]) -> Noise:
     """The noise of an observer, by the values of a calibration; the default's where it has none."""
     default = Noise()
