@@ -7,9 +7,7 @@ best cost so far (Ginsbourger's constant liar). Each batch goes to a journal; a 
 interrupted reads it and goes on, to the same result as one that was not.
 """
 
-import json
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +19,7 @@ from threadpoolctl import threadpool_limits
 from scenarios.experiment.experiment import Gain
 from scenarios.experiment.progress import bar, parallel
 from scenarios.experiment.result import Row
+from scenarios.tuning import journal
 from scenarios.tuning.methods import method_of
 from twin import TwinError
 
@@ -94,20 +93,21 @@ def with_bounds(
     )
 
 
-def search(objective: Objective, evaluations: int, jobs: int, journal: Path) -> Tuned:
+def search(objective: Objective, evaluations: int, jobs: int, path: Path) -> Tuned:
     """Searches, or goes on where the journal ends; at the end the journal is removed.
 
     Args:
         objective: what is minimised.
         evaluations: how many; rounded up to whole batches of `BATCH`.
         jobs: evaluations side by side.
-        journal: a file of JSON lines.
+        path: of the journal, see `scenarios.tuning.journal`.
 
     Raises:
-        TwinError: the journal belongs to another tuning.
+        TwinError: the journal is damaged or belongs to another tuning.
     """
     batches = -(-evaluations // BATCH)
-    done = _read(journal, objective)[:batches]
+    header = _header(objective)
+    done = journal.read(path, header, BATCH, objective.name)[:batches]
     points: list[Point] = []
     costs: list[float] = []
     cost = _Cost(objective.cost, tuple(gain.name for gain in objective.gains))
@@ -122,7 +122,7 @@ def search(objective: Objective, evaluations: int, jobs: int, journal: Path) -> 
                 found = done[k]
             else:
                 found = parallel(cost, batch, jobs, "")
-                _append(journal, objective, found)
+                journal.append(path, header, found)
             bounded = [min(x, objective.worst) for x in found]
             optimizer.tell([list(p) for p in batch], [math.log(x) for x in bounded])
             points += batch
@@ -130,7 +130,7 @@ def search(objective: Objective, evaluations: int, jobs: int, journal: Path) -> 
             shown.set_postfix(best=f"{min(costs):.4g}", refresh=False)
             shown.update(BATCH)
         predicted = _predicted_best(optimizer, points, costs)
-    journal.unlink(missing_ok=True)
+    path.unlink(missing_ok=True)
     best = points[int(np.argmin(costs))]
     return Tuned(
         evaluated=_named(objective, best),
@@ -200,43 +200,6 @@ def _header(objective: Objective) -> dict[str, Any]:
     header = {"tuning": objective.name, "metric": objective.metric, "bounds": bounds}
     # what began before there were others goes on
     return header | ({} if objective.method == "bayes" else {"method": objective.method})
-
-
-def _append(journal: Path, objective: Objective, costs: Sequence[float]) -> None:
-    """Adds a batch to the journal, safe on the disk; JSON has no infinity: null."""
-    lines = [] if journal.exists() else [_header(objective)]
-    lines.append({"costs": [cost if math.isfinite(cost) else None for cost in costs]})
-    with journal.open("a", encoding="utf-8") as file:
-        file.writelines(json.dumps(line) + "\n" for line in lines)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _read(journal: Path, objective: Objective) -> list[list[float]]:
-    """Costs of the batches in a journal; a line that was cut off does not count."""
-    if not journal.exists():
-        return []
-    lines = []
-    text = journal.read_text(encoding="utf-8")
-    for line in text.splitlines(keepends=True):
-        if not line.endswith("\n"):
-            break
-        try:
-            lines.append(json.loads(line))
-        except ValueError:
-            raise TwinError(f"{journal}: is no journal of a tuning; remove it") from None
-    kept = "".join(text.splitlines(keepends=True)[: len(lines)])
-    if kept != text:
-        journal.write_text(kept, encoding="utf-8")
-    if not lines:
-        journal.unlink()
-        return []
-    if lines[0] != _header(objective):
-        raise TwinError(
-            f"{journal}: belongs to another tuning than {objective.name} within today's bounds; "
-            "remove it to start anew"
-        )
-    return [[math.inf if cost is None else cost for cost in line["costs"]] for line in lines[1:]]
 
 
 def tuning_rows(objective: Objective, tuned: Tuned, estimator: str) -> list[Row]:
