@@ -128,10 +128,13 @@ class Stream:
         Raises:
             TwinError: the file cannot be written.
         """
-        clock = np.array([self._time, self._start, self._steps])
+        save_snapshot(path, self.observer, self._own())
+
+    def _own(self) -> dict[str, Array]:
+        """What decides what comes next beside the observer."""
+        clock = np.array([self._time, self._start, self._steps], dtype=np.float64)
         counts = np.array(list(self.counts.values()), dtype=np.float64)
-        more = {"clock": clock, "counts": counts, "u": self._u, "y": self._y}
-        save_snapshot(path, self.observer, more)
+        return {"clock": clock, "counts": counts, "u": self._u, "y": self._y}
 
     def restore(self, path: str | Path) -> None:
         """Goes on where a stream of the same vehicle and observer was saved.
@@ -139,7 +142,7 @@ class Stream:
         Raises:
             TwinError: the file is missing, broken or of another vehicle or observer.
         """
-        more = load_snapshot(path, self.observer)
+        more = load_snapshot(path, self.observer, self._own())
         self._time, self._start, steps = more["clock"].tolist()
         self._complete = self._time
         self._steps = int(steps)
