@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from twin.channels import FURTHER_OUTPUTS, OUTPUTS, WHEELS
 from twin.errors import TwinError
 from twin.logs import can
+from twin.logs.brake_noise import without_noise_below_zero
 from twin.logs.car_signals import GIVES, CarSignals, derive
 from twin.logs.formats import format_of
 from twin.logs.input_gaps import WithoutGaps, as_settings, runs, sentences, without_gaps
@@ -90,6 +91,7 @@ def by_map(log: RawLog, log_map: LogMap, car: CarSignals | None = None) -> dict[
         done += derive(columns, 1.0 / log_map.rate, meant, log_map.free_of_gravity)
     except TwinError as error:
         raise TwinError(f"{log_map.path}: {error}") from None
+    done += without_noise_below_zero(columns)
     if log_map.follow_speed:
         done.append("The log has no torques: the twin is to follow the measured vx.")
     inputs = _inputs(log, log_map, grid, columns)
