@@ -91,7 +91,7 @@ def test_drive_gives_timeline_history_and_scored_result(saved, drive):
     folder, status = saved
     assert status == 0
     names = {path.name for path in (folder / "out").iterdir()}
-    assert names == {f"drive.til.{ending}" for ending in ("json", "rrd", "parquet")}
+    assert names == {f"drive.til.{ending}" for ending in ("html", "json", "parquet", "rrd")}
     answer = answer_of(folder / "out" / "drive.til.json")
     mass, errors = mass_of(answer), answer["errors"]
     assert (mass["name"], mass["unit"]) == ("mass", "kg")

@@ -175,6 +175,11 @@ def estimate() -> Any:
     return import_module("scenarios.logs.estimate")
 
 
+def report_of_logs() -> Any:
+    """The module that writes the reports on recorded drives."""
+    return import_module("scenarios.logs.report")
+
+
 def estimate_stream() -> Any:
     """The module that observes samples from standard input."""
     return import_module("scenarios.logs.stream")

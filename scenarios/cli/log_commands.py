@@ -156,6 +156,13 @@ def calibrate(
     help="Folder for timelines, histories and finished results; every job must reach it.",
 )
 @click.option(
+    "--report/--no-report",
+    "with_report",
+    default=True,
+    show_default=True,
+    help="A page for people beside the timeline.",
+)
+@click.option(
     "--state",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
@@ -170,15 +177,16 @@ def estimate(
     jobs: int,
     dask: str | None,
     out: Path,
+    with_report: bool,
     state: Path | None,
     json_path: Path | None,
 ) -> int:
     """Observe recorded drives: LOG is Parquet, CSV or MDF 4, or - for standard input.
 
-    Of each LOG DIR receives NAME.ESTIMATOR.rrd, the timeline; .parquet, the estimates over time;
-    and .json, the result. A second call skips what is finished there, unless the log, the map, the
-    car or a version has changed. Truth in a log is only scored against. A bad log does not stop the
-    others; the exit status is then 2.
+    Of each LOG DIR receives NAME.ESTIMATOR.html, the report, which any browser opens; .rrd, the
+    timeline; .parquet, the estimates over time; and .json, the result. A second call skips what is
+    finished there, unless the log, the map, the car or a version has changed. Truth in a log is
+    only scored against. A bad log does not stop the others; the exit status is then 2.
 
     From standard input come samples, one JSON object a line or CSV with a row of names: time [s],
     inputs and measurements by our names or the map's, at any rate. Estimates go to standard output
@@ -192,10 +200,15 @@ def estimate(
         return catalogue.estimate_stream().run(vehicle, map_path, state)
     if state:
         raise Mistake("--state: is that of a stream; allowed: LOG is -")
+    pages = catalogue.report_of_logs()
+    if with_report and not pages.possible():
+        click.echo(f"til: {pages.MISSING}", err=True)
+        with_report = False
     with cluster(dask):
         result, text, bad = catalogue.estimate().run(
             [Path(log) for log in logs],
             vehicle=vehicle, map_path=map_path, estimators=estimators, jobs=jobs, out=out,
+            report=with_report,
         )  # fmt: skip
     if json_path != STANDARD_OUTPUT:
         click.echo(text)

@@ -8,21 +8,33 @@ _LISTED = 6  # spans of a log that a terminal shows
 
 def lines_of(answer: Answer) -> list[str]:
     """Estimates, what they rest on and what is not known, a line each."""
-    mass = [one for one in answer.quantities if one.name == "mass"]
-    others = [one for one in answer.quantities if one.name != "mass"]
-    lines = [_mass(one) for one in mass]
-    lines += _table(others)
+    lines = _masses(answer)
+    lines += _table([one for one in answer.quantities if one.name != "mass"])
+    lines += _motion(answer)
+    lines += [f"not known: {sentence}" for sentence in answer.unknown]
+    lines += _trust(answer)
+    lines += _errors(answer)
+    return lines
+
+
+def headlines(answer: Answer) -> list[str]:
+    """Mass, sideslip, speed and errors against the truth in the log, a line each."""
+    return [*_masses(answer), *_motion(answer), *_errors(answer)]
+
+
+def _masses(answer: Answer) -> list[str]:
+    return [_mass(one) for one in answer.quantities if one.name == "mass"]
+
+
+def _motion(answer: Answer) -> list[str]:
+    lines = []
     if answer.sideslip is not None:
         slip = answer.sideslip
         band = ", no band" if slip.band is None else f" (95 % band, rms: +-{slip.band:.2g} deg)"
         lines.append(
             f"sideslip {slip.end:+.2f} deg at the end, at most {slip.largest:.2f} deg{band}"
         )
-    lines.append(f"speed {answer.speed:.1f} m/s at the end")
-    lines += [f"not known: {sentence}" for sentence in answer.unknown]
-    lines += _trust(answer)
-    lines += _errors(answer)
-    return lines
+    return [*lines, f"speed {answer.speed:.1f} m/s at the end"]
 
 
 def number(value: float) -> str:

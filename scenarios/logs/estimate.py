@@ -25,6 +25,7 @@ from scenarios.logs.findings import Finding, findings, hills
 from scenarios.logs.guesses import with_guesses
 from scenarios.logs.mass_interval import unlike_forces, with_hills, with_torque_accuracy
 from scenarios.logs.pieces import lacking, measured, prepared
+from scenarios.logs.report import write_log_report
 from scenarios.logs.trust_spans import distrust_gaps
 from scenarios.timeline.timeline import write_timeline
 from twin import Drive, TwinError, Vehicle
@@ -52,6 +53,7 @@ class Task:
         estimator: of `ESTIMATORS`.
         out: where files go, and how they are called: `out / name`.
         name: without ending.
+        report: whether a page for people is written.
     """
 
     log: Path
@@ -60,6 +62,7 @@ class Task:
     estimator: str
     out: Path
     name: str
+    report: bool = False
 
     def file(self, ending: str) -> Path:
         """Of the folder, by its ending."""
@@ -99,6 +102,7 @@ def run(
     estimators: Sequence[str],
     jobs: int,
     out: Path,
+    report: bool = False,
 ) -> tuple[dict[str, Any], str, list[str]]:
     """Observes logs; returns the result as JSON, the same as text, and a line for each bad log.
 
@@ -112,7 +116,15 @@ def run(
     except OSError as error:
         raise TwinError(f"{out}: cannot be written: {error.strerror}") from error
     tasks = [
-        Task(log=log, map=map_path, vehicle=vehicle, estimator=estimator, out=out, name=name)
+        Task(
+            log=log,
+            map=map_path,
+            vehicle=vehicle,
+            estimator=estimator,
+            out=out,
+            name=name,
+            report=report,
+        )
         for log, name in zip(logs, _names(logs), strict=True)
         for estimator in dict.fromkeys(estimators)
     ]
@@ -150,6 +162,8 @@ def observe(task: Task) -> Outcome:
         )
         _write_timeline(task, found)
         _write_history(task, found)
+        if task.report:
+            _write_report(task, found, outcome)
         content = _told(task, outcome)
         with replacing(task.file(".json")) as partial:
             partial.write_text(json_text(_finite(content)) + "\n", encoding="utf-8")
@@ -271,10 +285,25 @@ def _write_history(task: Task, found: Found) -> None:
         pq.write_table(pa.table(columns), partial)
 
 
+def _write_report(task: Task, found: Found, outcome: Outcome) -> None:
+    if outcome.answer is None:
+        return
+    names = {"log": task.log.name, "map": task.map and task.map.name, "vehicle": task.vehicle}
+    write_log_report(
+        task.file(".html"),
+        found=found,
+        answer=outcome.answer,
+        vehicle=Vehicle.load(task.vehicle),
+        done=outcome.done,
+        settings=names | {"estimator": task.estimator},
+    )
+
+
 def _read(task: Task, mark: str) -> Outcome | None:
     """What a run before made of the same; None if there is none or something has changed."""
     path = task.file(".json")
-    if not all(task.file(ending).is_file() for ending in (".json", ".rrd", ".parquet")):
+    endings = (".json", ".rrd", ".parquet", *((".html",) if task.report else ()))
+    if not all(task.file(ending).is_file() for ending in endings):
         return None
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -330,4 +359,5 @@ def _as_text(task: Task, outcome: Outcome) -> str:
     title = f"{task.log}, {task.estimator}" + (f": {notes}" if notes else "")
     known = [] if outcome.answer is None else lines_of(outcome.answer)
     lines = [*known, *outcome.done, *(f"NOT TRUSTWORTHY: {fault}" for fault in outcome.faults)]
+    lines += [f"report: {task.file('.html')}"] if task.report else []
     return "\n".join([title, *(f"  {line}" for line in lines)])

@@ -1,17 +1,14 @@
 """All tables and pictures of a reproduction on one page that a browser opens offline."""
 
-import base64
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from string import Template
-from typing import Any
 
-from scenarios.experiment.result import Result, cell, replacing
+from scenarios.experiment.result import Result, cell
+from scenarios.report.page import image, items, table, write_page
 
-TEMPLATE = Path(__file__).with_name("report.html")
+TITLE = "Tables and figures of the papers, beside ours"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,12 +51,8 @@ class PictureOf:
 
 def write_report(sections: Sequence[Section], path: Path) -> None:
     """Writes the page, whole or not at all."""
-    page = Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        contents="\n".join(map(_link, sections)),
-        sections="\n".join(map(_section, sections)),
-    )
-    with replacing(path) as partial:
-        partial.write_text(page, encoding="utf-8")
+    contents = "\n".join(map(_link, sections))
+    write_page(path, TITLE, [f"<ul>\n{contents}\n</ul>", *map(_section, sections)])
 
 
 def _link(section: Section) -> str:
@@ -76,41 +69,16 @@ def _section(section: Section) -> str:
             f"<h2>{name}</h2>",
             f"<p>{escape(section.summary)}</p>",
             _table(result),
-            *([_image(section.picture, name)] if section.picture else []),
-            f'<p class="made">{result.seconds:.1f} s; settings: {_items(result.settings)}; '
-            f"versions: {_items(result.versions)}</p>",
+            *([image(section.picture, name)] if section.picture else []),
+            f'<p class="made">{result.seconds:.1f} s; settings: {items(result.settings)}; '
+            f"versions: {items(result.versions)}</p>",
             "</section>",
         ]
     )
 
 
 def _table(result: Result) -> str:
-    """The rows of the result, numbers to the right."""
     columns = result.columns()
     numeric = [not all(isinstance(value, str) for value in values) for values in columns.values()]
-
-    def line(tag: str, cells: Sequence[str]) -> str:
-        marked = (
-            f"<{tag}{' class=number' * is_number}>{escape(cell)}</{tag}>"
-            for cell, is_number in zip(cells, numeric, strict=True)
-        )
-        return f"<tr>{''.join(marked)}</tr>"
-
-    shown = zip(*(map(cell, values) for values in columns.values()), strict=True)
-    rows = "\n".join(line("td", cells) for cells in shown)
-    return (
-        f'<div class="wide"><table>\n<thead>{line("th", list(columns))}</thead>\n'
-        f"<tbody>\n{rows}\n</tbody>\n</table></div>"
-    )
-
-
-def _image(png: bytes, name: str) -> str:
-    return f'<img alt="{name}" src="data:image/png;base64,{base64.b64encode(png).decode()}">'
-
-
-def _items(values: Mapping[str, Any]) -> str:
-    texts = (
-        f"{key} {value if isinstance(value, str) else json.dumps(value, default=str)}"
-        for key, value in values.items()
-    )
-    return escape(", ".join(texts)) or "none"
+    rows = zip(*(map(cell, values) for values in columns.values()), strict=True)
+    return table(list(columns), rows, numeric)
