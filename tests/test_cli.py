@@ -381,3 +381,10 @@ def test_program_alone_prints_its_help(til):
 
 def test_version_is_that_of_the_package(til):
     assert til("--version")[1] == f"til {metadata.version('twin-in-the-loop')}\n"
+
+
+def test_picture_of_a_scenario_without_one_is_refused_before_the_run(til):
+    status, out, err = til("run", "fake", "--duration", "15", "--png", "x.png")  # 15 s: a bug
+    assert (status, out) == (2, "")
+    assert "--png: fake has no picture" in err
+    assert not Path("x.png").exists()

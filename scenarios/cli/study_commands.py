@@ -93,6 +93,8 @@ def run(
     """
     experiment = catalogue.scenario(name)
     experiment = experiment if car is None else experiment.of(car)
+    if png and not experiment.draws:
+        raise Mistake(f"--png: {name} has no picture; run it without --png")
     settings: dict[str, Any] = {"snr": snr, "duration": duration, "estimators": estimators}
     if gains:
         settings["gains"] = catalogue.find("gains")(gains, experiment, estimators)

@@ -278,6 +278,11 @@ class Experiment:
             raise TwinError(f"{self.name}: car is {car!r}; allowed: none, the scenario has its own")
         return self.with_car(car)
 
+    @property
+    def draws(self) -> bool:
+        """Whether `til run --png` has a picture to draw."""
+        return self.picture is not None or (self.study is not None and bool(self.study.picture))
+
     def at(self, snr: float | None) -> tuple[Case, ...]:
         """The cases of `til run` at a signal-to-noise ratio [dB]; None: at their own.
 
