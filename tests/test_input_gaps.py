@@ -185,4 +185,6 @@ def test_inspect_and_weigh_take_a_cut_drive(columns, tmp_path):
     assert trip.rate == pytest.approx(RATE)
     assert np.isnan(trip.force).sum() == 5 * RATE
     drive.save(tmp_path / "cut.parquet")
-    assert "the longest time without a gap" in inspect_log(tmp_path / "cut.parquet", None, "suv")
+    assert (
+        "the longest time without a gap" in inspect_log(tmp_path / "cut.parquet", None, "suv").text
+    )

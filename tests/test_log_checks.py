@@ -81,7 +81,7 @@ def test_wheel_speeds_stand_in_for_the_speed(drive):
 
 def test_inspection_shows_channels_what_the_map_does_and_the_checks(tmp_path):
     (tmp_path / "log.csv").write_text("t,a [g],gear\n0,1,P\n0.1,,P\n0.2,1,P\n1,2,D\n")
-    text = inspect_log(tmp_path / "log.csv", None)
+    text = inspect_log(tmp_path / "log.csv", None).text
     assert text.splitlines()[3].split() == ["a", "[g]", "g", "3", "4", "1", "0", "-", "1", "1", "2"]
     assert 'gear     "P"' in text
     assert "No checks" in text
@@ -89,6 +89,6 @@ def test_inspection_shows_channels_what_the_map_does_and_the_checks(tmp_path):
         '[channels.ax]\nname = "a [g]"\n[constants]\nsteering_wheel_angle = 0\n'
         "drive_torque = 0\nbrake_torque = 0\nroad_height = 0\n"
     )
-    text = inspect_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    text = inspect_log(tmp_path / "log.csv", tmp_path / "map.toml").text
     assert "ax: from 'a [g]' in g at 3 Hz" in text
     assert "cannot be made without ay, yaw_rate" in text

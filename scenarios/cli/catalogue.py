@@ -132,8 +132,8 @@ def find(name: str) -> Any:
     return pkgutil.resolve_name(_TARGETS[name])
 
 
-def inspection() -> Callable[[Path, Path | None, str | None], str]:
-    """What tells of a log, with a map or without, as text."""
+def inspection() -> Callable[[Path, Path | None, str | None, Path | None], Any]:
+    """What tells of a log, with a map or without, as text, and proposes a map."""
     return pkgutil.resolve_name("scenarios.logs.inspect:inspect_log")
 
 

@@ -30,12 +30,46 @@ from scenarios.cli.output import report, save
 @click.option(
     "--vehicle", metavar="CAR", help="A car's name or file: steering and torques are checked too."
 )
-def inspect(log: Path, map_path: Path | None, vehicle: str | None) -> None:
+@click.option(
+    "--dbc",
+    "database",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="LOG is a raw CAN log with this database: DBC, ARXML, KCD or SYM.",
+)
+@click.option(
+    "--write-map",
+    "new_map",
+    type=OutputFile(suffix=".toml"),
+    metavar="NEW.toml",
+    help="Write the map that is proposed, to be checked by you; no file is overwritten.",
+)
+def inspect(
+    log: Path,
+    map_path: Path | None,
+    vehicle: str | None,
+    database: Path | None,
+    new_map: Path | None,
+) -> None:
     """Show what is in LOG and check its signs, units and delays.
 
-    Each finding names the line of the map that would mend it.
+    Each finding names the line of the map that would mend it. Of a raw CAN log (BLF, ASC, candump
+    .log, TRC, CSV, MF4) messages, rates, gaps and, with --dbc, signals are shown, and a map is
+    proposed by their names and units. It is never used unless you save it and give it as --map.
     """
-    click.echo(catalogue.inspection()(log, map_path, vehicle))
+    if new_map is not None and new_map.exists():
+        raise Mistake(f"--write-map: {new_map} exists; allowed: a new file")
+    if new_map is not None and map_path is not None:
+        raise Mistake("--write-map: a map is given already; allowed: --map or --write-map")
+    told = catalogue.inspection()(log, map_path, vehicle, database)
+    click.echo(told.text)
+    if told.map:
+        click.echo(f"\n# map.toml\n{told.map}")
+    if new_map is None:
+        return
+    if not told.map:
+        raise Mistake(f"--write-map: no map is proposed for {log}; allowed: of CAN logs with --dbc")
+    new_map.write_text(f"{told.map}\n", encoding="utf-8")
 
 
 @click.command()

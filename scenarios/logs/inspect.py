@@ -1,14 +1,20 @@
 """What is in a log: channels, rates, gaps and units, and whether its signs can be right."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from scenarios.logs.bus import inspect_bus
 from scenarios.logs.checks import Check, checks
+from scenarios.logs.columns import aligned
 from scenarios.logs.findings import findings
 from scenarios.logs.pieces import longest_stretch
 from twin import Drive, Vehicle
 from twin.car.signals import signals_of
+from twin.logs import can
+from twin.logs.can import is_bus_log
 from twin.logs.drive import NoDrive
 from twin.logs.formats import format_of
 from twin.logs.map import LogMap
@@ -17,31 +23,54 @@ from twin.logs.resampling import gaps
 from twin.logs.units import CHANNELS, our_unit
 
 
-def inspect_log(path: Path, map_path: Path | None, vehicle: str | None = None) -> str:
-    """The text that `til inspect` prints.
+class Inspection(NamedTuple):
+    """What is told of a log.
+
+    Attributes:
+        text: for people.
+        map: a map to begin with, as TOML; empty if none is proposed.
+    """
+
+    text: str
+    map: str = ""
+
+
+def inspect_log(
+    path: Path, map_path: Path | None, vehicle: str | None = None, database: Path | None = None
+) -> Inspection:
+    """What `til inspect` prints.
 
     Args:
         path: of the log.
-        map_path: of its map; None: it is a drive of ours.
+        map_path: of its map; None: it is a drive of ours, or a raw CAN log.
         vehicle: name or file of the car, against which steering and torques are checked.
+        database: of a raw CAN log's messages; None: the one that the map names.
 
     Raises:
         TwinError: the log, the map or the car cannot be read, or they do not fit.
     """
+    if map_path is None and (database is not None or is_bus_log(path)):
+        return Inspection(*inspect_bus(path, database, vehicle))
     car = Vehicle.load(vehicle) if vehicle else None
     if map_path is None:
         try:
-            return _of_drive(path, Drive.load(path), car)
+            return Inspection(_of_drive(path, Drive.load(path), car))
         except NoDrive:
             log = format_of(path).read_log(path, Wanted())
-        return _channels(log) + (
-            "\n\nNo checks: the log is of another program, and a map (--map) tells its channels."
+        return Inspection(
+            _channels(log)
+            + "\n\nNo checks: the log is of another program, and a map (--map) tells its channels."
         )
     log_map = LogMap.load(map_path)
-    log = format_of(path).read_log(path, log_map.wanted)
+    if database is not None:
+        log_map = replace(log_map, database=database)
+    reader = can if log_map.database else format_of(path)
+    log = reader.read_log(path, log_map.wanted)
     drive = Drive.of_log(log, log_map, signals_of(car) if car else None)
     done = "\n".join(f"  {line}" for line in drive.settings["log"]["done"])
-    return f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive, car)}"
+    return Inspection(
+        f"{_channels(log)}\n\nBy the map {map_path}:\n{done}\n\n{_checks(drive, car)}"
+    )
 
 
 def _of_drive(path: Path, drive: Drive, car: Vehicle | None) -> str:
@@ -67,7 +96,7 @@ def _channels(log: RawLog) -> str:
     title = f"{log.path}: {len(log.channels)} channels from {start:.6g} to {end:.6g} s"
     if start > 1e6:  # since 1970, as a rule
         title += f", {end - start:.6g} s in all"
-    return "\n".join([title, *log.notes, _aligned(rows)])
+    return "\n".join([title, *log.notes, aligned(rows)])
 
 
 def _row(channel: Channel) -> tuple[str, ...]:
@@ -104,22 +133,10 @@ def _checks(drive: Drive, car: Vehicle | None) -> str:
             f"  Looked at {longest.time[0]:.6g} to {longest.time[-1]:.6g} s, the longest time "
             "without a gap."
         )
-    return "\n".join([_aligned(rows), "", "Findings:", *lines])
+    return "\n".join([aligned(rows), "", "Findings:", *lines])
 
 
 def _shown(check: Check) -> tuple[str, ...]:
     numbers = (f"{check.correlation:.3f}", f"{check.slope:.4g}", f"{check.lag:.2f}")
     correlation, slope, lag = ("-" if text == "nan" else text for text in numbers)
     return (check.name, correlation, slope, check.unit, lag, check.verdict)
-
-
-def _aligned(rows: list[tuple[str, ...]]) -> str:
-    """Rows as columns, two spaces between them; what is longer than the header stands alone."""
-    columns = len(rows[0])
-    full = [row for row in rows if len(row) == columns]
-    widths = [max(len(row[i]) for row in full) for i in range(columns)]
-    widths[0] = max(len(row[0]) for row in rows)
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
-        for row in rows
-    )

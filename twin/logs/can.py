@@ -4,7 +4,8 @@ Channels are called `Message.signal`. Frames that the database does not know, th
 or that carry no data are counted, never guessed.
 """
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Set
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -22,13 +23,17 @@ from twin.logs.raw_log import (
     Wanted,
     check_file_size,
     check_size,
-    check_time,
     listed,
 )
 from twin.toml_file import reason
 
 FORMATS = (".blf", ".asc", ".log", ".trc", ".csv", ".mf4")  # of python-can
 _BINARY = (".blf", ".mf4")
+_ALWAYS = (".blf", ".asc", ".trc")  # the others may be tables of numbers
+_BEGINNINGS = {
+    ".log": re.compile(r"\(\d+\.\d+\) +\S+ +[0-9A-Fa-f]{3,8}#"),
+    ".csv": re.compile("timestamp,arbitration_id,"),
+}
 _LARGEST_PAYLOAD = 64  # bytes, CAN FD
 _MOST_FRAMES = 20_000_000  # chosen: three hours of a busy bus; 1.6 GB would be the payload alone
 _BLOCK = 100_000  # frames that are read at once
@@ -76,38 +81,69 @@ def read_log(path: Path, wanted: Wanted) -> RawLog:
         raise TwinError(f"{path}: is a raw CAN log; allowed: with a database, [can] in the map")
     database = Database.load(wanted.database)
     bus = read_bus(path)
-    channels: dict[str, Channel] = {}
-    notes = [*database.notes]
-    unknown: dict[int, int] = {}
-    for identifier, frames in bus.frames.items():
-        message = database.messages.get(identifier)
-        if message is None:
-            unknown[identifier] = frames.time.size
-            continue
-        names = {f"{message.name}.{signal.name}" for signal in message.signals}
-        if wanted.names and not names & wanted.names:
-            continue
-        decoded, short = decode(message, frames.payload, frames.length)
-        if short:
-            notes.append(f"{message.name}: {short} frames are too short and left out.")
-        for signal, values in decoded.items():
-            there = np.isfinite(values)
-            if there.sum() < 2:
-                continue
-            name, unit = f"{message.name}.{signal}", database.units[message.name, signal]
-            check_time(path, name, frames.time[there])
-            channels[name] = Channel(time=frames.time[there], values=values[there], unit=unit)
-    if unknown:
-        shown = listed([f"{i & 0x7FFFFFFF:#x}" for i in unknown])
-        notes.append(f"{sum(unknown.values())} frames are not in the database: {shown}.")
-    if bus.without_data:
-        notes.append(f"{bus.without_data} error and remote frames are left out.")
+    channels, short = decoded(bus, database, wanted.names)
     if not channels:
         raise TwinError(
             f"{path}: no signal of {wanted.database} that is wanted is in it twice; it has frames "
             f"{listed([f'{i & 0x7FFFFFFF:#x}' for i in bus.frames])}"
         )
+    notes = [*database.notes]
+    notes += [f"{name}: {count} frames are too short and left out." for name, count in short]
+    unknown = {i: f.time.size for i, f in bus.frames.items() if i not in database.messages}
+    if unknown:
+        shown = listed([f"{i & 0x7FFFFFFF:#x}" for i in unknown])
+        notes.append(f"{sum(unknown.values())} frames are not in the database: {shown}.")
+    if bus.without_data:
+        notes.append(f"{bus.without_data} error and remote frames are left out.")
     return RawLog(path=path, channels=channels, notes=tuple(notes))
+
+
+def decoded(
+    bus: Bus, database: Database, wanted: Set[str] = frozenset()
+) -> tuple[dict[str, Channel], list[tuple[str, int]]]:
+    """The signals of a bus that occur at least twice.
+
+    Args:
+        bus: its frames.
+        database: what they mean.
+        wanted: names of signals, `Message.signal`; messages without any are left out. Empty: all.
+
+    Returns:
+        Channels by name, and by message how many frames were too short for a signal.
+    """
+    channels: dict[str, Channel] = {}
+    too_short: list[tuple[str, int]] = []
+    for identifier, frames in bus.frames.items():
+        message = database.messages.get(identifier)
+        if message is None:
+            continue
+        names = {f"{message.name}.{signal.name}" for signal in message.signals}
+        if wanted and not names & wanted:
+            continue
+        found, short = decode(message, frames.payload, frames.length)
+        if short:
+            too_short.append((message.name, short))
+        for signal, values in found.items():
+            there = np.isfinite(values)
+            if there.sum() < 2:
+                continue
+            name, unit = f"{message.name}.{signal}", database.units[message.name, signal]
+            channels[name] = Channel(time=frames.time[there], values=values[there], unit=unit)
+    return channels, too_short
+
+
+def is_bus_log(path: Path) -> bool:
+    """Whether a file is a raw CAN log: by its name's ending, of text by what it begins with."""
+    kind = path.suffix.lower()
+    if kind in _ALWAYS:
+        return True
+    if kind not in _BEGINNINGS:
+        return False
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            return _BEGINNINGS[kind].match(file.read(200)) is not None
+    except OSError:  # whoever reads it says so
+        return False
 
 
 def read_bus(path: Path) -> Bus:

@@ -59,43 +59,50 @@ UNITS = {
     },
 }
 
-# Other spellings, in lower case and without spaces
+# Other spellings, in lower case and without spaces; unit_... are those of Volkswagen's databases
 _ALIASES = {
     "angle": {
         "rad": "rad radian radians rads",
-        "deg": "deg degree degrees degs grad_angle",
+        "deg": "deg degree degrees degs grad_angle unit_degreofarc",
         "°": "º",
     },
     "angular rate": {
         "rad/s": "rad/sec radian/s radians/s rads/s radps rad/second rads/sec rads^-1",
-        "deg/s": "deg/sec degree/s degrees/s degs/s degps dps deg/second degrees/sec º/s °/sec",
+        "deg/s": "deg/sec degree/s degrees/s degs/s degps dps deg/second degrees/sec º/s °/sec "
+        "unit_degreofarcpersecon unit_degrepersecon",
         "rpm": "rev/min r/min u/min tr/min min-1 min^-1",
     },
     "speed": {
-        "m/s": "m/sec mps meter/s metres/s meters/s ms^-1 ms-1",
-        "km/h": "kmh kmph km/hr km/hour kmh-1 kmh^-1",
+        "m/s": "m/sec mps meter/s metres/s meters/s ms^-1 ms-1 unit_meterpersecon",
+        "km/h": "kmh kmph km/hr km/hour kmh-1 kmh^-1 unit_kilometerperhour",
         "mph": "mi/h miles/h mile/h",
         "kn": "kt kts knot knots",
         "ft/s": "fps ft/sec",
     },
     "acceleration": {
-        "m/s2": "m/s/s m/sec2 m/sec^2 m/s**2 ms-2 ms^-2 mps2 m/(s2) m/(s^2) m/ss meter/s2",
-        "g": "gn g0 gee gs",
+        "m/s2": "m/s/s m/sec2 m/sec^2 m/s**2 ms-2 ms^-2 mps2 m/(s2) m/(s^2) m/ss meter/s2 "
+        "unit_meterperseconsquar",
+        "g": "gn g0 gee gs unit_forceofgravi",
     },
     "torque": {
-        "N m": "n.m n·m n⋅m newtonmeter newtonmetre newton-meter newtonmeters n-m",
+        "N m": "n.m n·m n⋅m newtonmeter newtonmetre newton-meter newtonmeters n-m unit_newtometer",
         "kN m": "kn*m kn.m kn·m",
         "lbf ft": "lb-ft lbft lbfft ft-lb ftlb ft-lbf ftlbf lbf-ft lb*ft ft*lb lb.ft lbs-ft ft-lbs",
     },
     "force": {"N": "newton newtons", "lbf": "lb lbs pound pounds"},
-    "pressure": {"bar": "bars", "psi": "lbf/in2 psig psia", "kPa": "kilopascal", "Pa": "pascal"},
+    "pressure": {
+        "bar": "bars unit_bar",
+        "psi": "lbf/in2 psig psia",
+        "kPa": "kilopascal",
+        "Pa": "pascal",
+    },
     "length": {
         "m": "meter metre meters metres",
         "mm": "millimeter millimetre millimeters millimetres",
         "cm": "centimeter centimetre",
         "in": "inch inches",
     },
-    "ratio": {"%": "percent pct", "1": "- ratio"},
+    "ratio": {"%": "percent pct unit_percent", "1": "- ratio"},
     "time": {
         "s": "sec secs second seconds sek sekunde sekunden unixtime unix epoch posix utcseconds",
         "ms": "msec msecs millis milli millisec millisecs millisecond milliseconds msek",
