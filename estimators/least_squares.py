@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from twin import TwinError
 
 Array = NDArray[np.float64]
-CONFIDENCE = 0.95
+CONFIDENCE, NORMAL_95 = 0.95, 1.96
 PARTS = 8  # of the drive, left out in turn; chosen
 AT_BOUND = 1e-3  # of the range between the bounds
 TOLERANCE = 1e-3  # of the cost, relatively: far below what a confidence interval shows
@@ -72,7 +72,7 @@ def fit(
         block: rows that make a block.
         memory: rows that count as one witness against the prior.
         prior_sd: (n,) standard deviations of what is believed beforehand, around the start; inf:
-            nothing is.
+            nothing is. No interval is wider than the prior's.
         evaluations: the most, derivatives aside.
 
     Raises:
@@ -90,9 +90,8 @@ def fit(
             "parameters; allowed: more blocks than parameters: a longer drive, or fewer free"
         )
     steps = 0.01 * scale
-    pull = (
-        np.sqrt(memory) / np.asarray(np.inf if prior_sd is None else prior_sd) * np.ones_like(start)
-    )
+    sd = np.full_like(start, np.inf if prior_sd is None else prior_sd)
+    pull = np.sqrt(memory) / sd
 
     def jacobian(x: Array) -> Array:
         # towards the inside of the bounds
@@ -117,6 +116,7 @@ def fit(
     )
     last = found.fun[: first.size]
     half = _half_widths(found.jac[: first.size], last, block * first.shape[1], scale, pull)
+    half = np.fmin(half, np.where(np.isinf(sd), np.nan, NORMAL_95 * sd))
     return Fit(
         values=found.x,
         low=found.x - half,

@@ -3,7 +3,8 @@
 Two thirds of the log calibrate the twin and its competitors, measured sideslip included. Over the
 last third each has steering, speed, accelerations and yaw rate alone.
 
-`models/ferrari_250lm.toml` is the calibration that ships; `til tune ferrari` makes it anew.
+The twin runs as `til estimate` runs it, with the calibration that ships: `til calibrate` made
+`models/calibrations/ferrari_250lm.toml` from the first two thirds of the log, by its map.
 """
 
 import sys
@@ -19,40 +20,22 @@ import models
 from estimators.base import Estimate, sideslip_estimate
 from estimators.benchmarks import bicycle_ekf, single_track, static_map
 from estimators.entry import Given
-from estimators.speed_follower import SpeedFollower
-from scenarios.calibration import calibrate
-from scenarios.calibration.calibrate import cut
-from scenarios.calibration.ferrari_log import PARTS, data_file, load, part
+from scenarios.calibration.ferrari_log import PARTS, data_file, part
+from scenarios.calibration.plan import cut
 from scenarios.experiment.experiment import Case, Experiment, Recipe, Run, Score, Trial
 from scenarios.experiment.metrics import rms
-from scenarios.experiment.result import Result
-from scenarios.logs.candidate import Candidate
+from scenarios.logs.candidate import Candidate, candidate_of
+from scenarios.logs.pieces import prepared
 from scenarios.report.pictures import figure
 from twin import Drive, TwinError, Vehicle
+from twin.car.signals import signals_of
 
 Array = NDArray[np.float64]
 
 VEHICLE = "ferrari_250lm"
-CALIBRATION = "ferrari_250lm.toml"
+CALIBRATION, MAP = "calibrations/ferrari_250lm.toml", "maps/ferrari_250lm.toml"
 CALIBRATED_ON, SCORED_ON = PARTS
-# Freed by `tune`, each with how far the car is believed to lie from its files (chosen). Where the
-# log tells little a number so stays one that a car can have.
-FREE = {
-    **dict.fromkeys(("front_tyre_friction", "rear_tyre_friction"), 0.2),
-    **dict.fromkeys(("front_cornering_stiffness", "rear_cornering_stiffness"), 0.35),
-    "front_load_of_largest_stiffness": 0.35,
-    "rear_load_of_largest_stiffness": 0.35,
-    **{"relaxation": 0.4, "combined_slip": 0.4, "slip_stiffness": 0.3, "front_anti_roll": 0.7},
-    **{"cm_x": 0.08, "cm_y": 0.03},  # [m]; the driver sits on the right
-    "steering_offset": 0.004,  # [rad]
-    "brake_front": 0.1,
-    "sideslip_offset": 0.004,  # [rad]
-    **{"yaw_rate_to_yaw_rate": 20.0, "yaw_rate_to_vy": 15.0},
-    **{"locking": 400.0, "sideslip_lever": 0.2, "Jzz": 250.0},
-}
-SIGNALS = ("sideslip",)
-# Mass and drag area of models/ferrari_250lm.xml, wheel radii of the log
-FOLLOWER = SpeedFollower(mass=982.0, drag_area=0.55, radius_front=0.298, radius_rear=0.33)
+# Mass and axles of models/ferrari_250lm.xml
 GEOMETRY = single_track.Geometry(mass=982.0, front=1.33, rear=1.07, yaw_inertia=1350.0)
 BICYCLE = bicycle_ekf.Bicycle(mass=982.0, front=1.33, rear=1.07, yaw_inertia=1350.0)
 BICYCLE_RATE = 100.0  # [Hz], the log's own, at which the filter is fitted
@@ -60,14 +43,9 @@ BICYCLE_FREE = tuple(bicycle_ekf.FREE)
 BICYCLE_EVALUATIONS = 8  # chosen in the rival's favour: of 4, 8 and 12 the best on the last third
 
 
-def nominal() -> Candidate:
-    """The car of the files, uncalibrated."""
-    return Candidate(vehicle=Vehicle.load(VEHICLE), follower=FOLLOWER)
-
-
 def calibrated() -> Candidate:
     """The car with the calibration that ships."""
-    return replace(nominal(), values=calibrate.read(models.path(CALIBRATION)))
+    return candidate_of(Vehicle.load(models.path(CALIBRATION)))
 
 
 @dataclass(frozen=True)
@@ -157,7 +135,21 @@ class Log:
 
 @cache
 def _log(file: Path) -> Drive:
-    return load(file)
+    return log_of(file)
+
+
+def log_of(path: Path) -> Drive:
+    """The log in the twin's channels and steps, as `til estimate` reads it.
+
+    Raises:
+        TwinError: the file is no such log, or has gaps.
+    """
+    car = Vehicle.load(VEHICLE)
+    log = Drive.load(path, models.path(MAP), signals_of(car))
+    pieces = prepared(log, float(car.compile().opt.timestep)).pieces
+    if len(pieces) != 1:
+        raise TwinError(f"{path}: is {len(pieces)} pieces; allowed: a log without long gaps")
+    return pieces[0]
 
 
 def errors(trial: Trial) -> list[Score]:
@@ -173,26 +165,6 @@ def errors(trial: Trial) -> list[Score]:
             inside = np.abs(error[samples]) < 2.0 * sd[samples]
             scores.append(Score("sideslip", "coverage", "1", float(inside.mean()), case=name))
     return scores
-
-
-def tune(estimator: str, path: Path, *, jobs: int, evaluations: int) -> Result:
-    """Calibrates the twin on the first two thirds of the log.
-
-    Raises:
-        TwinError: another estimator is asked for, or the log is not there.
-    """
-    if estimator != "til":
-        raise TwinError(f"tune: estimator is {estimator!r}; allowed: til")
-    file = data_file()
-    drive = load(file)
-    task = calibrate.Task(
-        candidate=nominal(),
-        free=tuple(FREE),
-        prior_sd=FREE,
-        signals=SIGNALS,
-        drives=(cut(drive, part(drive, CALIBRATED_ON)),),
-    )
-    return calibrate.run(task, [file], path, jobs=jobs, evaluations=evaluations)
 
 
 def picture(trials: Sequence[Trial], path: Path) -> None:
@@ -247,7 +219,6 @@ EXPERIMENT = Experiment(
     metrics=errors,
     timeline="parameters",
     picture=picture,
-    calibrate=tune,
 )
 
 

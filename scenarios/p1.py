@@ -22,7 +22,8 @@ import models
 from estimators.base import Estimate
 from estimators.benchmarks import bicycle_ekf, static_map
 from scenarios.calibration import calibrate
-from scenarios.calibration.calibrate import Task, cut
+from scenarios.calibration.plan import cut
+from scenarios.calibration.task import Task
 from scenarios.experiment.experiment import Experiment, Study
 from scenarios.experiment.metrics import rms
 from scenarios.experiment.result import Result, Row

@@ -6,12 +6,13 @@ import pytest
 
 from estimators.speed_follower import TORQUES
 from scenarios.__main__ import main
-from scenarios.calibration import calibrate
-from scenarios.calibration.calibrate import Task, residuals
+from scenarios.calibration import calibrate, plan
+from scenarios.calibration.task import LARGEST, SIZES, Task, residuals
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
-from scenarios.logs.candidate import Candidate
-from scenarios.logs.free_parameters import BAND, FREE
+from scenarios.logs.candidate import Candidate, candidate_of
+from scenarios.logs.follower import driven
+from scenarios.logs.free_parameters import BAND, FREE, GAINS, SIDESLIP_SD
 from twin import OUTPUTS, TwinError, Vehicle
 
 FACTORS = {"front_cornering_stiffness": 0.85, "rear_cornering_stiffness": 1.2}
@@ -41,7 +42,7 @@ NOTHING = dict.fromkeys(FREE, np.inf)
 
 
 def task(drive, free=tuple(FACTORS), signals=("ay", "yaw_rate"), **values):
-    candidate = Candidate(vehicle=SUV, follower=calibrate.driven(SUV), values=values)
+    candidate = Candidate(vehicle=SUV, follower=driven(SUV), values=values)
     return Task(candidate=candidate, free=free, signals=signals, drives=(drive,), prior_sd=NOTHING)
 
 
@@ -80,13 +81,13 @@ def test_residuals_of_the_right_car_vanish(log):
 def test_offset_of_the_steering_and_of_the_sideslip_are_what_they_say(log):
     right = task(log, free=(*FACTORS, "sideslip_offset"), signals=("sideslip",))
     shifted = residuals(right, np.array([*FACTORS.values(), 0.01]))
-    np.testing.assert_allclose(shifted * calibrate.SIZES["sideslip"], 0.01, atol=1e-6)
+    np.testing.assert_allclose(shifted * SIZES["sideslip"], 0.01, atol=1e-6)
 
 
 def test_twin_that_cannot_drive_the_log_costs_the_largest_residuals(log):
     wild = task(log, free=("yaw_rate_to_vy",), yaw_rate_to_yaw_rate=20.0)
     wild = replace(wild, candidate=replace(wild.candidate, gains={("z", "az"): -1e4}))
-    assert (residuals(wild, np.array([0.0])) == calibrate.LARGEST).all()
+    assert (residuals(wild, np.array([0.0])) == LARGEST).all()
 
 
 def test_sample_without_measurement_says_nothing(log):
@@ -131,8 +132,8 @@ def test_command_writes_values_intervals_and_where_they_come_from(log, tmp_path,
     assert value["unit"] == "1"
     assert (content["vehicle"], content["logs"]) == ("suv", ["log.parquet"])
     assert [len(hash_) for hash_ in content["log_sha256"]] == [64]
-    assert content["to_s"] == pytest.approx([3.75], abs=0.01)  # the last quarter is held out
-    assert calibrate.read(out) == {"front_cornering_stiffness": value["value"]}
+    assert content["to_s"] == pytest.approx([5.0], abs=0.01)
+    assert list(content["values"]) == ["front_cornering_stiffness"]
     assert sorted(tmp_path.iterdir()) == [out, file]
 
 
@@ -143,8 +144,8 @@ def test_factors_stay_what_was_found_beside_a_freed_inertia(log, tmp_path):
     free = "front_cornering_stiffness,Jzz"
     command = ["calibrate", str(file), "--vehicle", "suv", "--free", free, "--evaluations", "3"]
     assert main([*command, "--out", str(out)]) == 0
-    found = calibrate.read(out)
-    assert 0.6 < found["front_cornering_stiffness"] < 1.1
+    found = tomllib.loads(out.read_text())["values"]["front_cornering_stiffness"]
+    assert 0.6 < found["value"] < 1.1
     assert Vehicle.load(out).compile() is not None
 
 
@@ -158,48 +159,64 @@ def test_command_leaves_nothing_after_a_mistake(log, tmp_path, capsys):
 
 
 def test_what_a_log_shows_is_fitted_and_freed_unless_somebody_says_else(torqueless, tmp_path):
-    assert calibrate.default_signals([torqueless], follows=True) == ("sideslip",)
+    assert plan.default_signals([torqueless], follows=True) == ("sideslip",)
     blind = [torqueless.replace(truth={})]
-    assert calibrate.default_signals(blind, follows=True) == ("ay", "yaw_rate")
-    assert calibrate.default_signals([torqueless], follows=False) == ("ay", "yaw_rate")
-    assert "sideslip_offset" in calibrate.default_free(("sideslip",))
-    assert set(calibrate.default_free(("ay",))) < set(calibrate.default_free(("sideslip",)))
-    assert set(calibrate.default_free(("sideslip",))) < set(FREE)
+    assert plan.default_signals(blind, follows=True) == ("ay", "yaw_rate")
+    assert plan.default_signals([torqueless], follows=False) == ("ay", "yaw_rate")
+    assert "sideslip_offset" in plan.default_free(("sideslip",))
+    assert set(plan.default_free(("ay",))) < set(plan.default_free(("sideslip",)))
+    assert set(plan.default_free(("sideslip",))) < set(FREE)
     file = tmp_path / "log.parquet"
     torqueless.save(file)
-    whole, nothing = calibrate.task_of([file], None, "suv", (), (), held_out=0.0)
-    most, kept = calibrate.task_of([file], None, "suv", (), (), held_out=0.5)
+    whole, nothing, _ = plan.plan_of([file], None, "suv", (), (), held_out=0.0)
+    most, kept, both = plan.plan_of([file], None, "suv", (), (), held_out=0.5)
+    assert [len(drive) for drive in both] == [len(drive) for drive in whole.drives]
     assert (whole.signals, nothing) == (("sideslip",), ())
     assert len(most.drives[0]) == pytest.approx(0.5 * len(whole.drives[0]), abs=1)
     assert len(kept[0]) == pytest.approx(len(most.drives[0]), abs=1)
 
 
-def test_band_is_as_wide_as_the_errors_of_what_was_not_fitted(torqueless):
-    """The other half of the drive shows another sideslip: the band has to hold there."""
-    candidate = Candidate(vehicle=SUV, follower=calibrate.driven(SUV), scheduled=True)
+def test_band_is_as_wide_as_the_errors_ask_for(torqueless):
+    """Another drive shows another sideslip: half of what it asks for counts."""
+    candidate = Candidate(vehicle=SUV, follower=driven(SUV), scheduled=True)
     fitted = Task(candidate=candidate, free=("drag",), signals=("sideslip",), drives=(torqueless,))
     off = torqueless.replace(
         truth={**torqueless.truth, "sideslip": torqueless.truth["sideslip"] + 0.05}
     )
-    alone = calibrate.with_band(fitted, np.ones(1)).candidate.values[BAND]
-    wider = calibrate.with_band(fitted, np.ones(1), (off,)).candidate.values[BAND]
-    assert wider > alone + 0.5
     found = fitted.at(np.ones(1))
-    held = replace(found, values={**found.values, BAND: wider}).run(off)
-    error = np.abs(found.sideslip(held) - off.truth["sideslip"])
+    own, unseen = (calibrate.band(found, (drive,)) for drive in (torqueless, off))
+    assert unseen > own + 1.0
+    wider = calibrate.with_band(fitted, np.ones(1), unseen).candidate.values[BAND]
+    assert wider == pytest.approx(np.log(0.5 * (own + unseen)))
+    alone = calibrate.with_band(fitted, np.ones(1)).candidate
+    held = alone.run(torqueless)
+    error = np.abs(alone.sideslip(held) - torqueless.truth["sideslip"])
     assert np.mean(error < 1.97 * held.sideslip_sd) == pytest.approx(0.95, abs=0.01)
 
 
-def test_file_that_is_no_calibration_is_refused(tmp_path):
-    path = tmp_path / "x.toml"
-    path.write_text("values = 3\n")
-    with pytest.raises(TwinError, match=r"x\.toml: is no calibration"):
-        calibrate.read(path)
-    with pytest.raises(TwinError, match=r"missing\.toml: cannot be read"):
-        calibrate.read(tmp_path / "missing.toml")
+def test_gains_that_are_freed_are_those_that_estimate_uses(torqueless, tmp_path):
+    """With the band that the errors ask for, over what was fitted and what was not."""
+    file, out = tmp_path / "log.parquet", tmp_path / "car.toml"
+    torqueless.save(file)
+    free = "front_cornering_stiffness,yaw_rate_to_yaw_rate"
+    command = ["calibrate", str(file), "--vehicle", "suv", "--free", free, "--evaluations", "2"]
+    assert main([*command, "--out", str(out)]) == 0
+    found = tomllib.loads(out.read_text())
+    assert list(found["values"]) == free.split(",")
+    assert list(found["fixed"]) == [SIDESLIP_SD]
+    car = Vehicle.load(out)
+    assert candidate_of(car).scheduled is False
+    estimate = candidate_of(car).observe(torqueless)
+    error = estimate.sideslip - torqueless.truth["sideslip"]
+    np.testing.assert_array_equal(estimate.sideslip_sd, found["fixed"][SIDESLIP_SD])
+    assert np.mean(np.abs(error) < 2.0 * estimate.sideslip_sd) >= 0.95
+    assert main(["estimate", str(file), "--vehicle", str(out), "--out", str(tmp_path)]) == 0
+    again = plan.plan_of([file], None, str(out), (), ()).task.candidate
+    assert again.scheduled
+    assert not set(again.values) & {*GAINS, SIDESLIP_SD}
 
 
 def test_follower_of_a_car_knows_its_mass_and_wheels():
-    follower = calibrate.driven(SUV)
+    follower = driven(SUV)
     assert follower.mass == pytest.approx(2125.8 + 4 * 53.0)
     assert 0.33 < follower.radius_front < 0.369  # loaded, below the tyre's free radius

@@ -5,6 +5,7 @@ import pytest
 
 from scenarios.__main__ import main
 from scenarios.calibration import calibrate
+from scenarios.calibration.task import Task
 from scenarios.driving.joint_drives import mixed
 from scenarios.driving.manoeuvres import swept_steer
 from scenarios.driving.record import record
@@ -116,7 +117,7 @@ def test_intervals_hold_on_a_car_that_differs_in_what_is_not_freed():
     covered = []
     for seed in range(8):
         drive = with_noise(clean, 20.0, np.random.default_rng(seed)).replace(truth={})
-        task = calibrate.Task(
+        task = Task(
             candidate=Candidate(vehicle=SUV),
             free=(*truth, "ay_offset", "yaw_rate_offset"),
             signals=("ay", "yaw_rate"),

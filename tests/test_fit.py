@@ -55,6 +55,22 @@ def test_intervals_cover_the_truth_in_spite_of_drift():
     assert covered[1] > 0.85
 
 
+def test_no_interval_is_wider_than_what_was_believed():
+    """What the parts of a drive disagree by does not make worse what was known without it."""
+    rng = np.random.default_rng(5)
+    wide = fit(problem(30.0 * drifting(rng)), TRUE, BOUNDS, [1.0] * 3, block=200)
+    assert np.all(wide.high - wide.low > 2.0 * 1.96 * 0.02)
+    found = fit(
+        problem(30.0 * drifting(rng)),
+        TRUE,
+        BOUNDS,
+        [1.0] * 3,
+        block=200,
+        prior_sd=[0.02, 0.02, 0.02],
+    )
+    assert np.all(found.high - found.low <= 2.0 * 1.96 * 0.02 + 1e-12)
+
+
 def test_value_at_its_bound_is_marked():
     found = fit(problem(0.0), [0.0] * 3, ([-5.0] * 3, [1.0, 5.0, 5.0]), [1.0] * 3, block=100)
     assert found.at_bound.tolist() == [True, False, False]

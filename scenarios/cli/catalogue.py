@@ -165,9 +165,11 @@ def planning() -> Any:
     return import_module("scenarios.planning.report")
 
 
-def calibrate() -> Any:
-    """The module that fits a twin to a log."""
-    return import_module("scenarios.calibration.calibrate")
+def calibration() -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """What says what is fitted to which logs, and what fits it."""
+    return pkgutil.resolve_name("scenarios.calibration.plan:plan_of"), pkgutil.resolve_name(
+        "scenarios.calibration.calibrate:run"
+    )
 
 
 def estimate() -> Any:

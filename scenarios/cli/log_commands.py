@@ -9,6 +9,7 @@ from scenarios.cli.options import (
     STANDARD_OUTPUT,
     Mistake,
     Names,
+    Numbers,
     OutputFile,
     count_option,
     dask_option,
@@ -110,7 +111,15 @@ def inspect(
     default=0.25,
     show_default=True,
     metavar="SHARE",
-    help="Of each log, at its end, that is not fitted: the result and its band are held to it.",
+    help="Of each log, at its end, that a first fit does not see: it is scored there.",
+)
+@click.option(
+    "--prior",
+    "prior_sd",
+    type=Numbers(),
+    metavar="NAME=SD,...",
+    default="",
+    help="How far what is free is believed to lie from the car's file, as front_anti_roll=0.5.",
 )
 @click.option("--from", "first", type=float, metavar="S", help="First time used.")
 @click.option("--to", "last", type=float, metavar="S", help="Last time used.")
@@ -127,6 +136,7 @@ def calibrate(
     free: tuple[str, ...],
     signals: tuple[str, ...],
     held_out: float,
+    prior_sd: dict[str, float],
     first: float | None,
     last: float | None,
     evaluations: int,
@@ -138,10 +148,13 @@ def calibrate(
 
     FILE holds values, their 95 % confidence intervals and where they come from; it is a car that
     --vehicle takes. A factor of 1 and a delta or offset of 0 are what the car's files say, and are
-    believed beforehand as far as the data do not say otherwise. The last quarter of each log is not
-    fitted: the result is scored on it, and the band of the sideslip is as wide as the errors there
-    ask for. Where a log has no torques the twin follows the measured vx, and the mass is not
-    observable.
+    believed beforehand as far as the data do not say otherwise. A first fit does not see the last
+    quarter of each log and is scored there; the band of the sideslip is as wide as the errors there
+    ask for. The fit that is written is to all. Where a log has no torques the twin follows the
+    measured vx, and the mass is not observable.
+
+    With a gain among what is freed the observer of the sideslip has constant gains; with none they
+    follow from a covariance, whose noises are fitted.
 
     What can be freed: factors of tyre_friction, cornering_stiffness, slip_stiffness,
     combined_slip, load_of_largest_stiffness, lateral_curvature and relaxation, each also with
@@ -152,11 +165,9 @@ def calibrate(
     """
     path = out or Path("out", "calibrate.toml")
     path.parent.mkdir(parents=True, exist_ok=True)
-    calibration = catalogue.calibrate()
-    task, kept = calibration.task_of(
-        logs, map_path, vehicle, free, signals, (first, last), held_out
-    )
-    found = calibration.run(task, logs, path, jobs=jobs, evaluations=evaluations, held_out=kept)
+    plan_of, run = catalogue.calibration()
+    plan = plan_of(logs, map_path, vehicle, free, signals, (first, last), held_out, prior_sd)
+    found = run(plan, logs, path, jobs=jobs, evaluations=evaluations)
     report(found, json_path)
 
 

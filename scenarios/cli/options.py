@@ -46,6 +46,25 @@ class Names(click.ParamType):
         return tuple(name.strip() for name in value.split(",") if name.strip())
 
 
+class Numbers(click.ParamType):
+    """Names with a number each, as a=1,b=2.5."""
+
+    name = "numbers"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> dict[str, float]:
+        """The numbers by name."""
+        found = {}
+        for part in Names().convert(value, param, ctx):
+            name, _, number = part.partition("=")
+            try:
+                found[name.strip()] = float(number)
+            except ValueError:
+                self.fail(f"{part!r} is no NAME=NUMBER", param, ctx)
+        return found
+
+
 class OutputFile(click.Path):
     """A file that can be written, which is tried before the long run."""
 

@@ -242,7 +242,6 @@ class Experiment:
         notes: sentences about a trial.
         timeline: the kind of timeline, a name of `scenarios.timeline.write.KINDS`.
         picture: draws trials of one drive, for `til run --png`.
-        calibrate: what `til tune` does instead of a search for gains.
         study: what is run instead of cases and estimators.
         with_car: the same with another car, by its name in `models` or its file; None: there is
             none, its vehicle belongs to the experiment.
@@ -261,7 +260,6 @@ class Experiment:
     notes: Callable[["Trial"], tuple[str, ...]] | None = None
     timeline: str = "parameters"
     picture: "Callable[[Sequence[Trial], Path], None] | None" = None
-    calibrate: Callable[..., Any] | None = None
     study: Study | None = None
     with_car: "Callable[[str], Experiment] | None" = None
 

@@ -10,7 +10,8 @@ from estimators.base import Estimate
 from estimators.speed_follower import SpeedFollower
 from estimators.til.observer import Observer
 from estimators.til.scheduled import ScheduledObserver
-from scenarios.logs.free_parameters import FREE, Kind, noise_of
+from scenarios.logs.follower import driven
+from scenarios.logs.free_parameters import FREE, GAINS, SIDESLIP_SD, Kind, noise_of
 from scenarios.logs.pieces import start_speed
 from twin import Drive, Twin, Vehicle
 
@@ -56,7 +57,10 @@ class Candidate:
             observer = Observer(twin, (), gains, follower=follower)
         radius = float(np.mean(self.vehicle.figures.wheel_radius))
         observer.reset(_first_speed(drive, radius), self.of("load"))
-        return observer.run(self.shifted(drive))
+        found = observer.run(self.shifted(drive))
+        if not self.scheduled and SIDESLIP_SD in self.values:
+            found = replace(found, sideslip_sd=np.full(len(drive), self.values[SIDESLIP_SD]))
+        return found
 
     def observe(self, drive: Drive) -> Estimate:
         """The same, with the sideslip of the point where it is measured among the outputs.
@@ -86,6 +90,20 @@ class Candidate:
         for k, name in enumerate(drive.output_names):
             measurements[:, k] -= self.values.get(f"{name}_offset", 0.0)
         return drive.replace(inputs=inputs, measurements=measurements)
+
+
+def candidate_of(vehicle: Vehicle) -> Candidate:
+    """What `til estimate` observes a log without torques with, by what the car's calibration holds.
+
+    Gains of the calibration are constant, as those of the paper; without any they are scheduled.
+    """
+    values = {name: value for name, value in vehicle.calibration if name in FREE}
+    return Candidate(
+        vehicle=vehicle,
+        values=values,
+        follower=driven(vehicle),
+        scheduled=not set(GAINS) & set(values),
+    )
 
 
 def _first_speed(drive: Drive, radius: float) -> float:

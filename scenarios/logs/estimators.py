@@ -14,9 +14,7 @@ from estimators.joint.real_car import REAL_CAR
 from estimators.til.default_observer import default_observer
 from estimators.til.observer import Observer
 from estimators.til.stream import rolling_radius
-from scenarios.logs.candidate import Candidate
-from scenarios.logs.follower import driven
-from scenarios.logs.free_parameters import FREE
+from scenarios.logs.candidate import candidate_of
 from scenarios.logs.guessed_priors import guessed_priors
 from scenarios.logs.pieces import Prepared, lacking, measured, start_speed
 from scenarios.planning.advice import missing, what_to_drive
@@ -46,22 +44,17 @@ class Found(NamedTuple):
 
 
 def til(vehicle: Vehicle, log: Prepared) -> Found:
-    """States and mass by the default observer; without torques the states, by scheduled gains.
+    """States and mass by the default observer; without torques states by the car's calibration.
 
     Raises:
         TwinError: an input is out of range, or the twin has blown up.
     """
-    return _scheduled(vehicle, log) if log.follows else _with_mass(vehicle, log)
+    return _following(vehicle, log) if log.follows else _with_mass(vehicle, log)
 
 
-def _scheduled(vehicle: Vehicle, log: Prepared) -> Found:
-    """States and sideslip with a standard deviation, by what a calibration found of the log."""
-    candidate = Candidate(
-        vehicle=vehicle,
-        values={name: value for name, value in vehicle.calibration if name in FREE},
-        follower=driven(vehicle),
-        scheduled=True,
-    )
+def _following(vehicle: Vehicle, log: Prepared) -> Found:
+    """States and sideslip with a standard deviation, by what a calibration found of the car."""
+    candidate = candidate_of(vehicle)
     estimate = _joined([candidate.observe(piece) for piece in log.pieces])
     missing = [name for name in ("ay", "yaw_rate") if name not in measured(log.pieces)]
     return Found(

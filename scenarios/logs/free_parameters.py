@@ -20,7 +20,7 @@ SCALE_SD = 0.25  # prior of a factor; chosen: a data sheet's tyres, springs and 
 # Of a noise's natural logarithm: a factor of 2.7, chosen; the bounds are a thousandfold
 LOG_SD, LARGEST_LOG = 1.0, 7.0
 
-Kind = Literal["scale", "load", "offset", "follower", "gain", "noise"]
+Kind = Literal["scale", "load", "offset", "follower", "gain", "noise", "band"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class Free:
     Attributes:
         kind: of what: a factor on the vehicle's files; a delta of the twin's chassis; an offset
             that is added to a channel; a field of `SpeedFollower`; a gain; the natural logarithm of
-            a field of `Noise` over its default.
+            a field of `Noise` over its default; a standard deviation that follows from errors.
         unit: of the number.
         start: where it is not given.
         low, high: bounds.
@@ -70,10 +70,13 @@ def _offset(unit: str, largest: float) -> Free:
     )  # fmt: skip
 
 
-def _gain(unit: str, start: float, low: float, high: float, of: tuple[str, str]) -> Free:
+def _gain(
+    unit: str, start: float, low: float, high: float, prior_sd: float, of: tuple[str, str]
+) -> Free:
     return Free(
-        kind="gain", unit=unit, start=start, low=low, high=high, scale=0.05 * (high - low), of=of
-    )
+        kind="gain", unit=unit, start=start, low=low, high=high, scale=0.05 * (high - low),
+        prior_sd=prior_sd, of=of,
+    )  # fmt: skip
 
 
 def _noise() -> Free:
@@ -86,7 +89,9 @@ def _noise() -> Free:
 # How far the twin of a corrected observer is from the car, and its sensors from the truth
 _NOISE = "log_noise_"
 NOISES = tuple(f"{_NOISE}{name}" for name in ("vy", "yaw_rate", "front", "rear", "ay"))
-BAND = f"{_NOISE}band"  # factor on the standard deviations; follows from the errors
+# Follow from the errors: a factor on the standard deviations of scheduled gains, and the standard
+# deviation of the sideslip with constant ones, which have none of their own
+BAND, SIDESLIP_SD = f"{_NOISE}band", "sideslip_sd"
 
 # Bounds are chosen: wide for a passenger car whose files are roughly right.
 FREE: Mapping[str, Free] = {
@@ -119,11 +124,13 @@ FREE: Mapping[str, Free] = {
         scale=300.0,
         prior_sd=500.0,
     ),
-    "yaw_rate_to_yaw_rate": _gain("1/s", 20.0, 0.0, 100.0, ("yaw_rate", "yaw_rate")),
-    "yaw_rate_to_vy": _gain("m/s per rad", 0.0, -50.0, 50.0, ("vy", "yaw_rate")),
-    "ay_to_vy": _gain("1", 0.0, 0.0, 0.95, ("vy", "ay")),
+    # priors of gains are chosen: as large as gains that were found useful
+    "yaw_rate_to_yaw_rate": _gain("1/s", 20.0, 0.0, 100.0, 20.0, ("yaw_rate", "yaw_rate")),
+    "yaw_rate_to_vy": _gain("m/s per rad", 0.0, -50.0, 50.0, 15.0, ("vy", "yaw_rate")),
+    "ay_to_vy": _gain("1", 0.0, 0.0, 0.95, 0.3, ("vy", "ay")),
     **{name: _noise() for name in NOISES},
     BAND: _noise(),
+    SIDESLIP_SD: Free(kind="band", unit="rad", start=0.0, low=0.0, high=math.pi, scale=0.01),
 }
 
 
@@ -135,6 +142,10 @@ DEFAULTS = (
     *("relaxation", "cm_x", "steering_offset"),
 )
 DEFAULTS_OF_SIDESLIP = ("sideslip_offset", "sideslip_lever")
+
+
+GAINS = tuple(name for name, free in FREE.items() if free.kind == "gain")
+FOLLOWING = (BAND, SIDESLIP_SD)  # from the errors of a fit: not to be freed
 
 
 def noise_of(values: Mapping[str, float]) -> Noise:

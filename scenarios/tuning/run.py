@@ -66,12 +66,6 @@ def tune(
         TwinError: nothing to tune, no such estimator or cost, or bounds are wrong.
     """
     start = time.perf_counter()
-    if experiment.calibrate:
-        if bounds or cost:
-            raise TwinError(
-                f"tune: {experiment.name} takes no --bounds and no --cost; allowed: neither"
-            )
-        return experiment.calibrate(estimator, path, jobs=jobs, evaluations=evaluations)
     tunable = [name for name, own in experiment.estimators.items() if own.tunable]
     if not tunable or not experiment.costs:
         raise TwinError(f"tune: {experiment.name} has no gains to choose")
